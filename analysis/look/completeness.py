@@ -56,7 +56,8 @@ def _constant_check(channel: Channel) -> Check:
 
 
 def check_copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Check for copies, also scaled or shifted ones. An excitation equal to its command is none: nothing fed back."""
+    """Check for copies, also scaled or shifted ones. An excitation that equals its command is not a copy: nothing was
+    fed back."""
     found = tuple(_copy_checks(channels))
     return fine_if_none(COPIES, found, "No channel is a copy of another.")
 

@@ -1,4 +1,4 @@
-"""What a device says of its linkage over a grid of positions, and what of it is refused.
+"""Calibration of a linkage: what a device reports over a grid of positions, and which readings are refused.
 
 J is of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong, Hutchinson,
 Vidyasagar, Robot Modeling and Control, chapter 4).

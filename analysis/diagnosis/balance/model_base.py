@@ -49,7 +49,7 @@ def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence
 
 
 def takes_enough(plain: Regression, least: float) -> bool:
-    """Whether all laws together take so much of the force, over the folds."""
+    """Whether all laws together explain at least this share of the force, in the mean over the folds."""
     alone = float(plain.cross_validated_errors(plain.columns_of(())).sum())
     whole = fit_all_laws(plain, range(plain.columns[0].shape[1]))[0]
     return alone - whole > least**2 * sum(block.signal for block in plain.fit)

@@ -94,5 +94,5 @@ def _subtract_prediction(measured: FloatArray, played: SimulationResult) -> Floa
 
 
 def predicted_channels(played: SimulationResult, count: int) -> FloatArray:
-    """(n, c): the response and, where there are so many channels, the position."""
+    """(n, count): the response and, where `count` includes it, the position."""
     return np.hstack([played.response, played.position])[:, :count]

@@ -73,7 +73,7 @@ class LawOutcome:
 
     @property
     def shows(self) -> bool:
-        """A diagnosis that broke down counts as one that should have seen something."""
+        """Whether the re-tuned model leaves a detectable error; a failed diagnosis counts as if it did."""
         return self.diagnosis is None or self.left("retuned") > DETECTABLE
 
     @property

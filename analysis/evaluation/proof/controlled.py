@@ -8,7 +8,7 @@ from analysis.diagnosis.document import Diagnosis
 CONFIDENT = 0.5
 """A probability from which a name is a confident one."""
 SAME_NUMBER = 0.02
-"""Relative: answers to mirrored recordings may differ by so much more than their sign."""
+"""Largest relative difference of parameters, their sign apart, between answers to mirrored recordings."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,7 +68,7 @@ class Score:
     figures: tuple[Figure, ...]
     calibration: Calibration
     misses: tuple[Outcome, ...]
-    """Everything that is not as it should be; what cannot be detected is none."""
+    """Wrong answers; a missing name for something undetectable is not wrong."""
 
 
 def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Score:

@@ -18,7 +18,7 @@ class ReproductionError(ListedProblemsError):
 
 @dataclass(frozen=True, config=STRICT)
 class Finding:
-    """One thing that the paper reports, beside what came out here."""
+    """One finding of the paper, beside the reproduced value."""
 
     what: str
     published: Annotated[str, Field(description="What the paper reports; empty where it reports nothing.")]

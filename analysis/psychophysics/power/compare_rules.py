@@ -59,7 +59,7 @@ def compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
 
 
 def compare_rules(crowd: Crowd, rules: Mapping[str, StaircaseRule], people: int, seed: int) -> tuple[RuleResult, ...]:
-    """One run of each of so many people, drawn from the crowd's first frequency, under every rule."""
+    """One run of each person under every rule; the people are drawn from the crowd's first frequency."""
     return tuple(_result(name, rule, crowd, people, seed) for name, rule in rules.items())
 
 

@@ -29,7 +29,7 @@ class FeltDelivery:
     adaptation_db: float = 1.0
     """Rise of the threshold in a long run."""
     adaptation_trials: float = 20.0
-    """After so many trials, 63 % of it has come."""
+    """Time constant of adaptation, in trials."""
 
 
 def felt_delivery(

@@ -76,7 +76,8 @@ class Participant(NamedTuple):
     trials_before: int = 0
     """Trials of the session before this run, from which a drifting criterion continues."""
     unsure: float = 0.0
-    """Asks for the same trial again where the average of all looks lies within so many standard errors."""
+    """Asks for the same trial again where the average of all presentations lies within this many standard errors of the
+    criterion."""
     repeats: int = 0
     """Most repeats in this run."""
     felt_1: FloatArray = AS_COMMANDED

@@ -67,7 +67,7 @@ def _scatter(alike: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArra
 
 
 LEFT_OUT_EVERY = 4
-"""Every so many lines one is held out for the choice of the order."""
+"""Every fourth line is held out for the choice of the order."""
 _RUN_AWAY = 1e120
 """Largest amplitude of a transient's spectrum: the square of a larger one overflows."""
 _STEP = 1e-6

@@ -17,7 +17,7 @@ class SensorFacts:
     spoiled_bytes: Count
     """That belonged to no whole packet."""
     restarts: Count
-    """How often its board began anew."""
+    """Number of restarts of the sensor's board."""
     ticks: Count = 0
     """Ticks of the recording; 0 where there is none."""
     unplaced_ticks: Count = 0

@@ -77,7 +77,7 @@ def has_answer(field: FormField, answer: str) -> bool:
 
 
 def number_in(answer: str) -> float | None:
-    """A decimal number, with point or comma; None if it is none."""
+    """Parse a decimal number, with point or comma; None for other text."""
     plain = answer.replace(",", ".")
     return float(plain) if re.fullmatch(r"[+-]?([0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15})", plain) else None
 

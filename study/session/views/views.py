@@ -77,7 +77,7 @@ class Question:
     """A short practice, with a criterion to pass."""
     progress: Progress | None = None
     repeats_left: int | None = None
-    """The participant may still ask so often for a trial of this run again. None: no limit (first rules)."""
+    """How often the participant may still ask for a trial of this run again. None: no limit (first rules)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +178,7 @@ class PracticeResult:
     passed: bool
     right: int
     of: int
-    """Right answers among the last so many."""
+    """Number of last answers of which the right ones are counted."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from typing import Literal
 from study.session.watching.live import Live
 
 Standing = Literal["running", "paused", "resting", "not running", "finished", "stopped", "refused", "excluded"]
-"""`stopped`: the sitting was ended; `not running`: the program is gone without a word. Both can be resumed."""
+"""`stopped`: the sitting was ended; `not running`: the program ended without writing so. Both can be resumed."""
 
 ON: tuple[Standing, ...] = ("running", "paused", "resting")
 
@@ -33,7 +33,7 @@ class WatchedRun:
 
 @dataclass(frozen=True, slots=True)
 class StaircasePoint:
-    """A counted trial that steers the run; catch trials are none."""
+    """A counted trial that steers the run; catch trials do not steer it."""
 
     trial: int
     level_n: float
@@ -183,7 +183,7 @@ class WatchView:
     gate_radius_mm: float
     """0 where there is no gate."""
     live: Live | None
-    """None where nothing was told for some seconds."""
+    """Live values; None where nothing was received for some seconds."""
     alarms: tuple[Alarm, ...]
     probes: int = 0
     """Kept so far, references included."""

@@ -31,7 +31,7 @@ TITLE = "The linkage was not calibrated"
 SAVED = "Nothing moved and nothing was written."
 LARGEST_M = 0.2
 SHOWN = 3
-"""Problems that an error tells; the others are counted."""
+"""Number of problems that an error lists; the others are counted."""
 
 
 @dataclass(frozen=True, slots=True)
