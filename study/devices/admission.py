@@ -1,4 +1,4 @@
-"""What the safety layer refuses before anything moves, each with a sentence that says why."""
+"""Requests that the safety layer refuses before anything moves, each with a sentence that says why."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The clock port, so that a session of half an hour can be run in a second of tests."""
+"""Clock port: real time, or virtual time in which a session of half an hour runs in a second."""
 
 import time
 from collections.abc import Callable

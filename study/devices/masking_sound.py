@@ -1,4 +1,4 @@
-"""Masking noise from the computer's own sound output, in a loop without a seam, while a participant sits at the device.
+"""Masking noise from the computer's sound output, in a seamless loop, while a participant sits at the device.
 
 The library (PortAudio by sounddevice) is imported only where a protocol asks for noise, and takes the samples in a
 thread of its own.

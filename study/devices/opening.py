@@ -1,4 +1,4 @@
-"""The one door to a device: every device that comes out of it stands behind the safety layer.
+"""Opens devices: the only access to one, and every device that is opened stands behind the safety layer.
 
 The heavy parts (numba above all) are imported when a device is opened, so that the command line starts at once.
 """

@@ -1,4 +1,5 @@
-"""The bare devices behind `study.devices.opening`, which alone may ask for one. Heavy: imported when one is opened."""
+"""Drivers by name: builds the bare device for `study.devices.opening`, which alone may ask for one. Heavy to import:
+loaded when a device is opened."""
 
 from collections.abc import Callable
 from functools import partial

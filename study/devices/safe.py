@@ -1,4 +1,4 @@
-"""The device behind its safety layer: the `Device` port over any rig, compiled or stepped, in any time.
+"""Safety layer: the `Device` port over any rig, compiled or stepped, in real or virtual time.
 
 What a force may be is decided in `governor.govern`, what is refused beforehand in `admission`, when ticks run in
 `drive.virtual_drive` and `drive.realtime_drive`.

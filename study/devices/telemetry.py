@@ -1,4 +1,4 @@
-"""The telemetry ring: what each tick of a device's loop saw and sent, in memory that other programs can read meanwhile.
+"""Telemetry ring: the readings and forces of each tick of a device's loop, in memory that other programs can read.
 
 One writer, the loop (`governor.telemetry_row`), any number of readers. The writer never waits and knows of no reader;
 a reader that comes too late is told how many rows it lost. The ring is a file in memory (Linux: /dev/shm; elsewhere

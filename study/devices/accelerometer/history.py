@@ -1,4 +1,5 @@
-"""The last minutes of samples, with when they arrived and what was lost until then. One thread adds, others take."""
+"""Ring of the last minutes of samples, with their time of arrival and the packets lost. One thread adds, others
+read."""
 
 import threading
 from dataclasses import dataclass

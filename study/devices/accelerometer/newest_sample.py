@@ -1,4 +1,4 @@
-"""The newest sample of a sensor, handed from the thread that reads it to a loop that waits for nothing.
+"""Newest sample of a sensor, handed without locks from the thread that reads it to a loop that must not wait.
 
 One writer, any number of readers, compiled ones too. A reader sees a whole sample, unless the writer laps it within a
 reading: then it reads once more. The lock is a barrier: its release makes a row visible before the count that names it.

@@ -1,4 +1,5 @@
-"""From bytes as they come, torn, lost or garbled, to samples: every packet whose check sum is right, in order.
+"""Parses a byte stream, which may be torn, incomplete or garbled, to samples: every packet whose checksum is right, in
+order.
 
 A packet is looked for at every byte, so a garbled one hides none of its neighbours. A check sum is right by chance once
 in 65 536 times; so a packet counts when its number and time follow those of the one before, or, where the

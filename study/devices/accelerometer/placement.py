@@ -1,4 +1,4 @@
-"""Samples by the board's clock, placed on the ticks of the loop by the host's.
+"""Resamples the board's samples to the ticks of the loop, by the fitted clock.
 
 Each clock between two restarts of the board is fitted by itself (`clock_fit`). Then a low-pass without delay (a
 windowed sinc about each tick, over the samples as they lie in time) keeps what a rate of ticks can show and takes away

@@ -1,4 +1,4 @@
-"""What comes from a board, before anything is made of it: numbered samples, the time by its clock, what was lost.
+"""Samples of a board before any processing: sequence numbers, times by the board's clock, counts of lost packets.
 
 A source is a serial line or a data-acquisition device; nothing behind it knows which.
 """

@@ -1,5 +1,5 @@
-"""The accelerometer as the rig wants it: a thread reads the board, the newest sample is there at any time, and what
-belongs to the ticks of a recording can be asked for when it is over."""
+"""Accelerometer as a rig uses it: a thread reads the board; the newest sample is available at any time, and after a
+recording the samples at its ticks."""
 
 import contextlib
 import threading

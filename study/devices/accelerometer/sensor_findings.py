@@ -1,4 +1,5 @@
-"""What `hapteq doctor` says of an accelerometer at rest: rate, losses, clock, noise. None of it locks a device."""
+"""Findings of `hapteq doctor` about an accelerometer at rest: rate, losses, clock, noise. They are warnings: none of
+them prevents the use of a device."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""`compiled_drive` with its arguments: the rig's halves, the governor's arrays, and where the readings are seen."""
+"""Arguments of `compiled_drive`: the rig's compiled halves, the governor's arrays, and the array of last readings."""
 
 import numpy as np
 

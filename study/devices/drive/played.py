@@ -1,5 +1,5 @@
-"""From the rows of the compiled loop to what was played: a recording and its health. The samples of an accelerometer
-with a clock of its own come in here."""
+"""Converts the rows of the compiled loop to a recording and its health; samples of an accelerometer with its own clock
+are added here."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Running ticks: sense, govern, write. A force reaches a rig here, compiled, or in `stepped_runner`.
+"""Runs ticks: sense, govern, write. Compiled rigs get their forces here, others in `stepped_runner`.
 
 A simulated device runs whole blocks of ticks without Python. The three parts of a tick come as function pointers, not
 as inlined code: the loop is compiled once for every rig, its compiled form can be kept on disk, and it never holds an

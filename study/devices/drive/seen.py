@@ -1,4 +1,4 @@
-"""What was read from a rig last, and how the rest of the program hears of it."""
+"""Last reading of a rig, and its form for the rest of the program."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The acceptance of a device: checked with no hand on it, signed by an operator, and gone when something changes.
+"""Acceptance of a device: checked with no hand on it, signed by an operator, and void when something changes.
 
 Without one, a device opens for no hand: neither for a person's nor for one that is simulated in a session.
 """

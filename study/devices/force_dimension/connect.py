@@ -1,6 +1,5 @@
-"""From a name to a device that is open, calibrated, armed with its watchdog, and takes forces: or an error that says
-what is missing. Where a step fails, what was opened is stopped and closed again.
-"""
+"""Connects to a device by name: opened, calibrated, watchdog armed, forces on; otherwise an error that says what is
+missing. If a step fails, the device is stopped and closed again."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""What a check before a study day finds of a device: library, connection, power, calibration, watchdog. Zero force."""
+"""Findings about a device before a study day: library, connection, power, calibration, watchdog. Commands no force."""
 
 import contextlib
 import time

@@ -1,4 +1,4 @@
-"""Both halves of a tick of a device of the vendor, compiled: the reading, and the force.
+"""Both halves of a tick, compiled: reading and force.
 
 They are the law for every caller: the loop calls them without the interpreter, the rig's own methods call them from
 Python. An answer of 0 is fine; any other is one of the codes below, `FAILED` keeps the first, and no force follows it.

@@ -1,4 +1,4 @@
-"""One opened device: the library's functions with its number filled in, in values instead of pointers."""
+"""An opened device: the library's functions bound to its number, with values instead of pointers."""
 
 import contextlib
 from ctypes import byref, c_double, c_int, c_ubyte, c_ushort

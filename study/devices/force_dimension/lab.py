@@ -1,4 +1,4 @@
-"""What a lab knows of its device beyond the vendor's library: a small TOML file, of which every key may be left out."""
+"""A lab's settings of its device, such as its accelerometer: a small TOML file, in which every key is optional."""
 
 import os
 import re

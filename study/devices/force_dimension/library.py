@@ -1,4 +1,4 @@
-"""The vendor's functions, bound by ctypes: every answer below zero becomes an error with the library's own words.
+"""Bindings of the vendor's functions by ctypes: a negative return value becomes an error with the library's own text.
 
 The library keeps its last error per thread, so the text is fetched at once, in the thread whose call failed.
 """

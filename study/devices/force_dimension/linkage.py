@@ -1,4 +1,4 @@
-"""What the vendor's library knows of an open device's linkage, at any position: computed, so nothing moves.
+"""Linkage of an open device at any position, as the vendor's library computes it: nothing moves.
 
 A position becomes encoder counts, joint angles, Jacobian, inertia and gravity torques, each by a function of the
 library. The device gets no force and stays braked; where its handle is does not matter, beyond one comparison.

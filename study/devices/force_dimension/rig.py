@@ -1,4 +1,4 @@
-"""A device of the vendor as a rig: readings, forces, and all that makes it let go.
+"""A device of the vendor as a rig: readings, forces, and everything that releases its force.
 
 Beyond what the safety layer does, a force above the cap or no number is never sent (`halves`), and the library is told
 the cap as well. Anything odd ends in an error: the safety layer then writes zero, and the watchdog sees to the rest.

@@ -1,4 +1,4 @@
-"""Which of the vendor's devices are plugged in, and whether this account may open them: asked of Linux itself.
+"""Devices of the vendor on the USB, and whether this account may open them, as Linux reports it.
 
 A device that may not be opened looks to the vendor's library as if it were not there.
 """

@@ -1,4 +1,5 @@
-"""Proof that the device lets go by itself: it is armed, the loop stops on purpose, and the force must be gone in time.
+"""Proof that the device's watchdog works: it is armed, the loop stops on purpose, and the device must switch its force
+off in time.
 
 The command is zero throughout, so nothing pulls whether or not it works; what counts is that the device says that it
 takes no forces any more, that its brakes hold, and that its watchdog is why.

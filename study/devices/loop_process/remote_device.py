@@ -1,4 +1,4 @@
-"""The device port over a device in the loop's process. No call waits without a bound.
+"""Device port over a device in the loop's process. Every call has a timeout.
 
 A process that ended, or that does not answer, is a lost device: it is killed where it still runs, so that no force
 comes back, and the device's own watchdog has dropped what it held.

@@ -1,4 +1,4 @@
-"""What runs in the loop's process: a device behind its safety layer, and a thread for each line of its caller.
+"""Main program of the loop's process: a device behind its safety layer, and a thread for each pipe of its caller.
 
 A sign of life is always the caller's: `keep_alive` runs when it is called from there, and `play` goes on only as long
 as the caller answers its progress. When the caller's end of a pipe closes, for any reason, the force fades, the brakes

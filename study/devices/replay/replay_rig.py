@@ -1,4 +1,4 @@
-"""A recording as a rig: for any force that is asked for, the handle moves as it once did.
+"""A recording as a rig: whatever force is commanded, the handle moves as recorded.
 
 Before each stimulus the stretch is looked for whose recorded excitation is nearest to what shall be played (least
 squares over the whole stretch). Commands that were recorded so are answered exactly as they were then; others by the
