@@ -13,6 +13,7 @@ _UNTIMED = (
 
 NONE = "–"
 _NAMED = 12
+"""Most things that a sentence lists."""
 
 
 def typeset(formatted: str) -> str:

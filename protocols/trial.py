@@ -103,8 +103,8 @@ class Trial:
     nominal_n: float | None = None
     """Level of the staircase, where `level_n`, which was played, was drawn around it. None where nothing is roved."""
     lost_packets: int | None = None
-    """Of the accelerometer's, those that arrived torn or garbled among them. None, with the next two, where it is read
-    with each tick or there is none."""
+    """Lost packets of the accelerometer, torn or garbled ones among them. None, with the next two, where the sensor is
+    read with each tick or there is none."""
     garbled_bytes: int | None = None
     """From the accelerometer, that belonged to no whole packet."""
     acceleration_missing: float | None = None

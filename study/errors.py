@@ -1,5 +1,7 @@
 """Base error for screen and command line: what happened, what was saved, what to do now."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import IntEnum
 from typing import Any
 
@@ -49,10 +51,23 @@ class DeviceError(StudyError):
     exit_code = ExitCode.DEVICE
 
 
-class LeftError(StudyError):
+class UserInterruptError(StudyError):
     """Ctrl-C was pressed or the terminal closed, and what was done so far is safe."""
 
     exit_code = ExitCode.INTERRUPTED
+
+
+@contextmanager
+def resumable(happened: str, saved: str, also: tuple[type[UserInterruptError], ...] = ()) -> Iterator[None]:
+    """Turn Ctrl-C into a UserInterruptError which says that the same command continues. also: UserInterruptError, where
+    a part of the work raises its own, which says less."""
+    caught: tuple[type[BaseException], ...] = (KeyboardInterrupt, *also)
+    try:
+        yield
+    except caught as interruption:
+        raise UserInterruptError(
+            "Interrupted", happened, "Run the same command again: it goes on where it stopped.", saved
+        ) from interruption
 
 
 def _restore_error(kind: type[StudyError], fields: dict[str, Any]) -> StudyError:

@@ -14,5 +14,5 @@ def machine_zone(time: datetime) -> datetime:
 
 
 def local_now() -> str:
-    """Such as "2026-11-22 14:05 +01:00"."""
+    """Local time now, such as "2026-11-22 14:05 +01:00"."""
     return local_time(datetime.now(UTC).isoformat(), machine_zone)

@@ -53,7 +53,7 @@ class Change:
     """Limit of the difference; for noise, of the ratio."""
     unit: str
     changed: bool
-    """Beyond the limit, and beyond the scatter of the measurements."""
+    """Whether the change exceeds both its limit and the scatter of the measurements."""
     band_hz: tuple[float, float] | None = None
     """Band in which a response changed most."""
     peaks_hz: tuple[float, float] | None = None

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import fill_gaps
+from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
 from equalizer.signals.recording import Recording, Segment
@@ -72,10 +73,6 @@ def _response(recording: Recording) -> FrequencyResponse:
     return response
 
 
-def _excited(recording: Recording) -> FloatArray:
-    return (recording.command if recording.excitation is None else recording.excitation).samples
-
-
 def _friction_n(recording: Recording, axis: int) -> tuple[float, float]:
     """Mean and standard error over strokes of the work that a stroke loses, over the path of the handle.
 
@@ -97,7 +94,7 @@ def _is_stroke(recording: Recording, segment: Segment) -> bool:
 
 
 def _driven_axis(recording: Recording, segment: Segment) -> int:
-    return int(np.argmax(np.ptp(_excited(recording)[segment.start : segment.stop], axis=0)))
+    return int(np.argmax(np.ptp(instrument_signal(recording)[segment.start : segment.stop], axis=0)))
 
 
 def _lost_per_path_n(recording: Recording, start: int, stop: int, axis: int) -> float:
@@ -114,7 +111,7 @@ def _lost_per_path_n(recording: Recording, start: int, stop: int, axis: int) -> 
 
 def _second_halves_of_rests(recording: Recording) -> list[FloatArray]:
     """Stretches (k, outputs) at rest; in the first half of each rest what was excited dies away."""
-    still = np.concatenate([[False], ~_excited(recording).any(axis=1), [False]])
+    still = np.concatenate([[False], ~instrument_signal(recording).any(axis=1), [False]])
     edges = np.flatnonzero(np.diff(still.astype(np.int8)))
     longest = int((edges[1::2] - edges[::2]).max(initial=0))
     return [

@@ -35,6 +35,7 @@ SAME = 2.0
 """Ratio of squared misfits below which two causes cannot be told apart. On the simulated omega.3 a hand that becomes
 one and a half of what it was leaves 1.2 to 1.7 times what a gain leaves: friction is more there than its law."""
 DELAY_STEPS = 3
+"""Gauss-Newton steps for a delay, in which the response is not linear."""
 DEVIATIONS = 4.0
 """Standard errors beyond which a number is more than the scatter."""
 
@@ -42,7 +43,7 @@ CAUSES = {"friction": ("friction",), "grip": ("mass", "damping", "stiffness"), "
 NUMBERS = ("friction", "mass", "damping", "stiffness", "gain", "delay")
 UNITS = {"friction": "N", "mass": "kg", "damping": "N s/m", "stiffness": "N/m", "gain": "", "delay": "s"}
 LEAST = {"friction": 0.03, "mass": 0.01, "damping": 0.5, "stiffness": 15.0, "gain": 0.03, "delay": 3e-4}
-"""A change below is none that matters: 3 % of a stimulus of 1 N, or a tenth of a light grip."""
+"""Smaller changes do not matter: 3 % of a stimulus of 1 N, or a tenth of a light grip."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,9 +23,10 @@ FROM_HZ = 3.0
 """Integrated twice, what the accelerometer says below is drift."""
 
 TO_HZ = 150.0
+"""Upper end of the compared lines: above it the position hardly moves."""
 
 BREAK_AWAYS_M = (2e-6, 8e-6, 2e-5, 5e-5)
-"""Lengths over which friction builds up: from as good as none to a soft one. Which holds, the data say."""
+"""Lengths over which friction builds up, from almost none to a soft one; the best-fitting one is taken."""
 
 PASSES = 3
 """Periods gone through until the force repeats."""

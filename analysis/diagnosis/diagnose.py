@@ -82,12 +82,12 @@ def _diagnose_by_model(
     if settings.fitted and is_too_short_to_name(recordings):
         unsearched = SearchOutcome(_unsearched(recordings, fitting, settings, map_), CleanFloor())
         return _assemble(recordings, settings, fitting, unsearched, balances)
-    seen = search_by_simulation(recordings, fitting, settings, map_, progress, balances)
+    outcome = search_by_simulation(recordings, fitting, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
         progress("weighing laws in the force balance", 0.9)
-        seen, balances = _judge_with_model(recordings, fitting, seen, settings)
+        outcome, balances = _judge_with_model(recordings, fitting, outcome, settings)
     progress("writing down what was found", 0.95)
-    return _assemble(recordings, settings, fitting, seen, balances)
+    return _assemble(recordings, settings, fitting, outcome, balances)
 
 
 def _diagnose_beside_clean(
@@ -111,9 +111,9 @@ def _diagnose_beside_clean(
         contrast = contrast.without_name(TOO_SHORT)
     if not settings.fitted and (noise_is_from_repeats(fitting.chosen) or predicts_clean(model, settings.clean)):
         found_by_model = _diagnose_by_model(recordings, model, settings, map_, progress)
-        said = found_by_model.diagnosis
-        names = frozenset(name for effect in said.effects for name in (effect.effect, *effect.class_))
-        if not contrast.contradicts(names, said.verdict == "explained"):
+        by_model = found_by_model.diagnosis
+        names = frozenset(name for effect in by_model.effects for name in (effect.effect, *effect.class_))
+        if not contrast.contradicts(names, by_model.verdict == "explained"):
             return found_by_model
     elif not settings.fitted and contrast.left_open:
         unweighed = _search_beside_clean(recordings, model, settings, contrast.tested_effects, map_, progress)
@@ -149,15 +149,15 @@ def _search_beside_clean(
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared)
     rest = replace(settings, without=(*settings.without, *weighed))
     try:
-        seen = search_by_simulation(recordings, fitting, rest, map_, progress, ())
+        outcome = search_by_simulation(recordings, fitting, rest, map_, progress, ())
     except (NothingLearned, np.linalg.LinAlgError):
         return None
-    context = seen.result.context
-    found = keep_identifiable(context, seen.result.found, settings.time_left)
-    result = require_enough_gain(replace(seen.result, found=found, errors=None), False)
+    context = outcome.result.context
+    found = keep_identifiable(context, outcome.result.found, settings.time_left)
+    result = require_enough_gain(replace(outcome.result, found=found, errors=None), False)
     if not (result.judgement.named and result.found.steps):
         return None
-    return _assemble(recordings, settings, fitting, replace(seen, result=result), ())
+    return _assemble(recordings, settings, fitting, replace(outcome, result=result), ())
 
 
 def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper) -> tuple[Balance, ...]:
@@ -169,23 +169,23 @@ def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_
 
 
 def _judge_with_model(
-    recordings: Sequence[Recording], fitting: FittingMeasure, seen: SearchOutcome, settings: DiagnosisSettings
+    recordings: Sequence[Recording], fitting: FittingMeasure, outcome: SearchOutcome, settings: DiagnosisSettings
 ) -> tuple[SearchOutcome, tuple[Balance, ...]]:
-    weigh = partial(judge_with_model, recordings, fitting, seen.result, settings.time_left)
-    beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultBesideModel(seen.result))
-    return replace(seen, result=beside.result), beside.balances
+    weigh = partial(judge_with_model, recordings, fitting, outcome.result, settings.time_left)
+    beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultBesideModel(outcome.result))
+    return replace(outcome, result=beside.result), beside.balances
 
 
 def _assemble(
     recordings: Sequence[Recording],
     settings: DiagnosisSettings,
     fitting: FittingMeasure,
-    seen: SearchOutcome,
+    outcome: SearchOutcome,
     balances: Sequence[Balance],
 ) -> Findings:
-    result, names = seen.result, names_of_parts(recordings, settings.names)
+    result, names = outcome.result, names_of_parts(recordings, settings.names)
     found = result.found if result.judgement.named else replace(result.found, after=result.found.retuned)
-    whole = assemble_findings(replace(result, found=found), fitting.chosen.floors, names, seen.floor)
+    whole = assemble_findings(replace(result, found=found), fitting.chosen.floors, names, outcome.floor)
     channels = recordings[0].command.channels
     found_too = unconfirmed_candidates(result.unconfirmed, whole.black_box, recordings[0], fitting.model)
     if settings.fitted:

@@ -11,6 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from analysis.diagnosis.found_law import FoundLaw
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME, Place
+from equalizer.signals.listed_problems import ListedProblemsError
 
 FORMAT, VERSION = "hapteq-diagnosis", 1
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, populate_by_name=True)
@@ -24,12 +25,8 @@ EffectWord = Annotated[
 ]
 
 
-class DiagnosisError(ValueError):
+class DiagnosisError(ListedProblemsError):
     """A document that is not a diagnosis. `problems`: one sentence each."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True, config=STRICT)

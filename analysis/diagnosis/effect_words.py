@@ -192,7 +192,7 @@ def noun_of(effect: str) -> str:
 
 
 def place_of(effect: str) -> Place:
-    """Where an effect of the vocabulary acts, or a law that it lacks."""
+    """Place (mechanism, actuator, sensor or hand) at which an effect of the vocabulary, or a law outside it, acts."""
     known = EFFECTS_BY_NAME.get(effect)
     law = LAW_WORDS.get(effect)
     return known.place if known is not None else "mechanism" if law is None else law.place
@@ -238,14 +238,14 @@ def numbers_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
         main = (EFFECTS_BY_NAME[effect].main.name,) if effect in EFFECTS_BY_NAME else tuple(parameters)[:1]
         named = dict.fromkeys(main, _BARE)
     shares = known.shares if known else ()
-    said = [
+    texts = [
         words.format(estimate_text(parameters[name], name in shares))
         for name, words in named.items()
         if name in parameters
     ]
     if "side" in parameters:
-        said.append(f"reached in the {'positive' if parameters['side'].value > 0 else 'negative'} direction")
-    return ", ".join(said)
+        texts.append(f"reached in the {'positive' if parameters['side'].value > 0 else 'negative'} direction")
+    return ", ".join(texts)
 
 
 def estimate_text(estimate: Estimate, share: bool = False) -> str:

@@ -14,7 +14,6 @@ from analysis.diagnosis.data.command_gaps import bridge_gaps
 from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.found_segments import find_segments
 from analysis.diagnosis.data.input_checks import require_different, require_something
-from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from analysis.wording import begin_sentence, conjoin
 from equalizer.signals.recording import Recording
 
@@ -36,13 +35,19 @@ def prepare(
     balance needs it. short: few cycles or samples are a remark and no refusal; None: as plain. Raises
     NothingToDiagnose."""
     found = [find_segments(each) for each in recordings]
-    told = [(name, text) for name, (_, text) in zip(names, found, strict=True) if text]
-    repeats = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in told)
+    named_repeats = [(name, text) for name, (_, text) in zip(names, found, strict=True) if text]
+    repeats = tuple(text if len(recordings) == 1 else f"{name}: {text}" for name, text in named_repeats)
     read = tuple(each for each, _ in found)
-    formed, said = one_motion_per_force(read) if plain else (read, ())
+    formed: tuple[Recording, ...] = read
+    left_out: tuple[str, ...] = ()
+    if plain:
+        # Imported here: a given model says which motion each force drives.
+        from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
+
+        formed, left_out = one_motion_per_force(read)
     driven, gaps = bridge_gaps(all_as_force_driven(formed), names)
     kept = comparable(driven, names, plain if short is None else short)
-    return PreparedRecordings(kept.recordings, (*repeats, *said, *gaps, *kept.remarks))
+    return PreparedRecordings(kept.recordings, (*repeats, *left_out, *gaps, *kept.remarks))
 
 
 def comparable(recordings: Sequence[Recording], names: Sequence[str], short: bool) -> PreparedRecordings:

@@ -14,7 +14,6 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
-from analysis.diagnosis.search.impacts import explain_impacts
 from analysis.diagnosis.search.search import HUM, SearchResult, has_law, hums_low, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
@@ -80,13 +79,16 @@ def search_by_simulation(
     if balances and found.result.judgement.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
         found = replace(found, result=unname_doubtful_effects(require_enough_gain(found.result, repeats)))
-    seen = found.result
-    left = seen.judgement.verdict in ("unexplained", "partly_explained") and not has_law(seen)
-    if left and not seen.context.certain and settings.time_left():
+    result = found.result
+    left = result.judgement.verdict in ("unexplained", "partly_explained") and not has_law(result)
+    if left and not result.context.certain and settings.time_left():
+        # Imported here: only a diagnosis that leaves something open looks for impacts.
+        from analysis.diagnosis.search.impacts import explain_impacts
+
         progress("looking for play that rattles", 0.9)
-        rattled = explain_impacts(seen.context, seen.found, chosen.floors, may_be_named)
+        rattled = explain_impacts(result.context, result.found, chosen.floors, may_be_named)
         if rattled is not None:
-            return replace(found, result=SearchResult(seen.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
+            return replace(found, result=SearchResult(result.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
     return found
 
 

@@ -43,7 +43,7 @@ STILL_SHARE = 0.01  # of the mean square of the motion that is fitted, below whi
 
 # Which error measure suits (`error_measure_rule`, `closed_loop`). By hand.
 FED_BACK_SHARE = 0.1  # of the command's rms that must differ from the recorded excitation: then the loop is closed
-FORETOLD_SHARE = 0.05  # of what its own past leaves of a command that the responses may leave (test of Granger 1969)
+PREDICTED_SHARE = 0.05  # of what its own past leaves of a command that the responses may leave (test of Granger 1969)
 DIES_OUT_SHARE = 1 / 3  # of the longest record, within which a plant that holds itself comes to rest
 SETTLED_CONSTANTS = 5.0  # time constants after which a motion is gone; principle: exp(-5) is below 1 %
 MOST_LEFT_OUT = 0.25  # share of a recording that may be left out until then
@@ -82,7 +82,7 @@ STATES_NAMED = 2  # per axis or channel; principle: what depends on one state is
 STARTS_PER_CLAIM = 4
 WEAKEST_START, STRONGEST_START = 0.1, 6.0  # factors by which a starting value's strength may be wrong
 MOST_FITTED, LEAST_FITTED = 10, 4  # hypotheses that get a first fit
-WORTH_FITTING = 0.2  # share of the best one's foreseen gain that another must foresee
+WORTH_FITTING = 0.2  # share of the best predicted gain that another candidate's must reach
 MOST_REFINED = 3  # fits that are taken to the end
 WORTH_REFINING = 0.5  # share of the best one's gain that such a fit must have gained
 SAME_START = 0.01  # of what two starts of a law leave, that they may differ by to be one
@@ -101,7 +101,7 @@ SHORT_SHARE = 0.7  # of the samples, above which the whole is simulated at once;
 # Whether a further effect is looked for, and added (`explain`). By hand.
 MOST_EFFECTS = 3
 NOISE_ALONE = 1.05  # error that counts as noise alone
-SEALED_SURPRISE = 1.15  # error of the re-tuned model on sealed samples from which an effect is looked for all the same
+HELD_OUT_SURPRISE = 1.15  # held-out error of the re-tuned model from which an effect is looked for all the same
 SEARCH_ON = 1.12  # error from which a further effect is looked for; principle: laws of real physics are never exact
 ADDED_SHARE = 0.15  # of what is left above the noise that an effect must take to be added,
 ADDED_GAIN = 0.003  # and the least gain
@@ -125,15 +125,15 @@ NO_PREDICTION_ERROR = 3.0  # by hand
 # The verdict (`verdict`, `search`). By hand, but where a bank is named.
 EXPLAINED_ERROR = 1.12  # as good as noise; principle: laws of real physics are never exact
 CONVINCING_SHARE, CONVINCING_ERROR = 0.93, 1.3  # of the mismatch taken; then so is this: real friction reverses rounder
-HELD_OUT_ERROR = 1.5  # on sealed samples. Bank 93000: 169 of 172 right explanations below, three of nine wrong above
+HELD_OUT_ERROR = 1.5  # on held-out samples. Bank 93000: 169 of 172 right explanations below, three of nine wrong above
 NAMED_ERROR = 3.0  # up to which what was found is named beside a remainder;
 NAMED_SHARE = 0.9  # above, where it explains this share of the mismatch,
 NAMED_GAIN = 1.6  # or gains this, four fifths of the error power: noise may be small beside all physics
 EXPLAINED_BY_CHANCE = 2.5  # error over chance, where a statistic is compared; principle: no law of a contact is exact
-CONFIRMED_SHARE = 0.3  # of the mismatch, in logarithms, that must fall on sealed samples,
-SEALED_TOO_SMALL = 0.05  # unless it is smaller there than this
-# on sealed samples, and over that on all others: all but the loudest of the sealed ones, or half, are opened
-SEALED_ALONE_ERROR, SEALED_ALONE_TIMES = 1.25, 1.5
+CONFIRMED_SHARE = 0.3  # of the mismatch, in logarithms, that must fall on held-out samples,
+HELD_OUT_TOO_SMALL = 0.05  # unless it is smaller there than this
+# on held-out samples, and over that on all others: all but the loudest of the held-out ones, or half, are opened
+HELD_OUT_ALONE_ERROR, HELD_OUT_ALONE_TIMES = 1.25, 1.5
 LOUDER = 1.05  # times the largest command elsewhere, from which on a stretch is louder
 
 # Faults that a recording shows by itself (`model_free_faults`). By hand.
@@ -146,7 +146,7 @@ LEARNED_TOO_MUCH = 0.3  # share of the signal from which what a device in order 
 # Rattling play (`impacts`). By hand.
 VARIES_ERROR = 3.0  # rms between periods, over the noise, from which a response is irregular
 PEAKED_KURTOSIS = 10.0  # or of what is left, where nothing repeats; 3 for noise
-IMPACTS_LEAST_SPREAD = 0.05  # rms of a logarithm of amplitude; principle: no simulation foresees it better
+IMPACTS_LEAST_SPREAD = 0.05  # rms of a logarithm of amplitude; principle: no simulation predicts it better
 IMPACTS_SHARE, IMPACTS_ERROR = 0.6, 3.0  # of the linear model's misfit to be taken, and most that is left over chance
 IMPACTS_AS_GOOD = 1.1  # times the named one's misfit, up to which a rival is as good
 
@@ -179,7 +179,7 @@ LAW_SNAP = 0.003  # relative: so near a simple exponent, and so much more error,
 LAW_BEATS = 0.5  # of a catalogue rival's excess that a law may leave at most
 LAW_STABLE = 0.2  # jackknife error of a factor over stretches, as a share; principle: five standard errors from none
 LAW_PLACEBO = 0.5  # of what chance leaves of a shuffled force, that a law may leave of the missing one at most
-LAW_SAME = 0.05  # of what a law foretells: laws that are no further apart are one, written in two ways (issue 16)
+LAW_SAME = 0.05  # of what a law predicts: laws that are no further apart are one, written in two ways (issue 16)
 PITCHES_SEEN = 2.0  # of a periodic force, below which another curve may do as well; principle: a period is seen twice
 LAW_COMMAND_TAKEN = 0.5  # of its axis's command, beyond which a force is the balance's trivial solution; by hand
 LAW_NEAR = 0.03  # of a whole or half exponent, that is then no number to be told

@@ -8,6 +8,7 @@ import numpy as np
 from analysis.wording import typeset
 
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"), (1e9, "G"))
+"""SI prefixes with their factors."""
 _KEPT = (0.01, 1e4)
 """Between these a unit needs no prefix, unless people always give it one."""
 _ALWAYS_PREFIXED = ("m", "s", "m/s", "N m")
@@ -17,6 +18,7 @@ _NO_PREFIX = re.compile(r"1/|[A-Za-z]+\^")
 _RAISED = {"^2": "²", "^3": "³"}
 _SYMBOLS = {"deg": "°"}
 _MOST_DIGITS, _DIGITS = 5, 3
+"""Most digits of a number, and its usual significant digits."""
 
 
 @dataclass(frozen=True, slots=True)

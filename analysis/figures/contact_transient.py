@@ -1,4 +1,5 @@
-"""A transient at a contact: what was wanted, what came along the normal and across it, and the forces that did it."""
+"""A transient at a contact: the wanted acceleration, the delivered one along the normal and across it, and the
+forces."""
 
 import numpy as np
 from matplotlib.figure import Figure

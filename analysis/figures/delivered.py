@@ -12,12 +12,12 @@ from analysis.figures.style import (
     GREY,
     PAGE_IN,
     VERMILLION,
+    draw_no_data_note,
     name_panel_axes,
     new_figure,
     newton_ticks,
     panel_grid,
     plain_axes,
-    say_nothing_to_draw,
 )
 from protocols.trial import Trial
 
@@ -29,7 +29,7 @@ def draw_delivered(trials: Sequence[Trial]) -> Figure:
     """Acceleration amplitude along and off the direction against the commanded level, one panel per frequency."""
     measured = [trial for trial in trials if trial.counts and trial.delivered_mps2]
     if not measured:
-        return say_nothing_to_draw(new_figure(PAGE_IN, 2.0), "No trial has a measured acceleration.")
+        return draw_no_data_note(new_figure(PAGE_IN, 2.0), "No trial has a measured acceleration.")
     frequencies = sorted({trial.frequency_hz for trial in measured})
     figure, panels = panel_grid(len(frequencies), 2.3, sharex=True)
     levels = [trial.level_n for trial in measured]

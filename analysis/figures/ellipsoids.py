@@ -8,11 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
-from analysis.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, new_figure, say_nothing_to_draw
+from analysis.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, draw_no_data_note, new_figure
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.wording import number
 
 _COLUMNS = 6
+"""Panels side by side."""
 _COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
 _STYLES: tuple[LineStyleType, ...] = ("-", "--", "-.", ":", (0, (5, 1)))
 
@@ -23,7 +24,7 @@ def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
     The horizontal line is the test direction. Repeats lie over each other; directions differ by colour and dash.
     """
     if not results:
-        return say_nothing_to_draw(new_figure(8.6, 2.0), "There is no ellipsoid to draw.")
+        return draw_no_data_note(new_figure(8.6, 2.0), "There is no ellipsoid to draw.")
     frequencies = sorted({result.frequency_hz for result in results})
     directions = list(dict.fromkeys(result.along for result in results))
     height = 1.1 * max(0.4, *(_half_height(result) for result in results))

@@ -22,7 +22,7 @@ _HALF, _TALLER = 0.4, 0.35
 _LETTERS = 110
 """Letters that fit into the width of the figure."""
 _Shade = tuple[str, float]
-"""Colour and opacity."""
+"""Colour and opacity, as Matplotlib takes them."""
 
 
 def frequency_bands_picture(
@@ -92,14 +92,14 @@ def _mark_onset(axes: Axes, frequency_hz: float, onset: CouplingOnset) -> None:
 def _draw_rows(axes: Axes, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float) -> None:
     lowest, highest = bands[0].low_hz, bands[-1].high_hz
     coupled_hz = highest if onset.frequency_hz is None else min(max(onset.frequency_hz, lowest), highest)
-    _bar(axes, 2, (lowest, coupled_hz), "axes hardly couple", _shade(GREY, 0.18))
-    _bar(axes, 2, (coupled_hz, highest), "axes couple", _shade(GREY, 0.45))
-    _bar(axes, 1, (lowest, direction_limit_hz), "directions are felt", _shade(ORANGE, 0.45))
-    _bar(axes, 1, (direction_limit_hz, highest), "hardly felt", _shade(ORANGE, 0.18))
+    _bar(axes, 2, (lowest, coupled_hz), "axes hardly couple", (GREY, 0.18))
+    _bar(axes, 2, (coupled_hz, highest), "axes couple", (GREY, 0.45))
+    _bar(axes, 1, (lowest, direction_limit_hz), "directions are felt", (ORANGE, 0.45))
+    _bar(axes, 1, (direction_limit_hz, highest), "hardly felt", (ORANGE, 0.18))
     for band in bands:
         room = int(_LETTERS * np.log(band.high_hz / band.low_hz) / np.log(highest / lowest))
         words = f"{band.name}\n{fill(band.method, max(room, 10))}"
-        _bar(axes, 0, (band.low_hz, band.high_hz), words, _shade(_COLOURS[band.name], 0.35))
+        _bar(axes, 0, (band.low_hz, band.high_hz), words, (_COLOURS[band.name], 0.35))
     axes.set_yticks([2, 1, -_TALLER], ["Device", "Person", "Driven by"])
     axes.set_ylim(-1.2, 2.5)
     axes.tick_params(axis="y", length=0)
@@ -115,7 +115,3 @@ def _bar(axes: Axes, row: int, band_hz: tuple[float, float], words: str, colour:
     middle = row - (_TALLER if row == 0 else 0.0)
     axes.fill_between([low_hz, high_hz], middle - half, middle + half, color=colour, linewidth=0)
     axes.text(float(np.sqrt(low_hz * high_hz)), middle, words, ha="center", va="center", fontsize=8.5, linespacing=1.1)
-
-
-def _shade(colour: str, strength: float) -> _Shade:
-    return colour, strength

@@ -23,6 +23,7 @@ SHOWN_SAMPLES = 600
 """Samples shown where two time series are compared."""
 _FIT, _TEST, _BAND = "#EEF3E6", "#FBEFD9", "#EEF3E6"
 _DECADES = 8
+"""Decades below the largest amplitude that a spectrum shows."""
 _COLOUR_OF = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "position": SKY, "condition": GREY}
 
 

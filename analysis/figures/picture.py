@@ -69,7 +69,7 @@ class Picture:
 
 
 def picture_svg(picture: Picture) -> str:
-    """As `inline_svg`, drawn once."""
+    """Draw a picture once and return it as inline SVG (see `inline_svg`)."""
     if not picture.drawn:
         picture.drawn.append(inline_svg(picture.figure, picture.name, picture.title, picture.alternative))
     return picture.drawn[0]
@@ -81,7 +81,7 @@ def without_figure(picture: Picture) -> Picture:
 
 
 def count_in_samples(picture: Picture) -> Picture:
-    """Of a recording without known time: all texts in samples instead of seconds and hertz. To be called before
+    """State all texts in samples instead of seconds and hertz, for a recording without known time. Call it before
     drawing."""
     for text in picture.figure.findobj(Text):
         if isinstance(text, Text):

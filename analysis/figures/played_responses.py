@@ -11,11 +11,12 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.evaluation.reproduction.played_response import PlayedResponse
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, new_figure, plain_axes, say_nothing_to_draw
+from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, draw_no_data_note, new_figure, plain_axes
 
 _AXES = "xyz"
 _COLOURS = (BLUE, VERMILLION, GREEN)
 _LOWEST_DB, _HIGHEST_DB = -55.0, 12.0
+"""Range of the vertical axis."""
 _TICKS_HZ = (5, 10, 20, 35)
 
 
@@ -46,7 +47,7 @@ def friction_picture(rows: Sequence[PlayedResponse]) -> Picture:
 def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
     """One row of panels for each, three columns."""
     if not rows:
-        return say_nothing_to_draw(new_figure(8.6, 2.0), "Nothing was played.")
+        return draw_no_data_note(new_figure(8.6, 2.0), "Nothing was played.")
     figure = new_figure(8.6, 0.8 + 1.75 * len(rows))
     grid = figure.subplots(len(rows), 3, sharex=True, sharey=True, squeeze=False)
     for panels, row in zip(grid, rows, strict=True):

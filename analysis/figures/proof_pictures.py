@@ -13,7 +13,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes, ratio_ticks
 
 MARKS = {"right": ("o", BLUE), "in the set": ("D", ORANGE), "missed": ("X", VERMILLION), "invisible": (".", GREY)}
-NOTHING_SAID = "no name"
+NO_ANSWER = "no name"
 
 
 def proof_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
@@ -80,12 +80,12 @@ def _size_picture(singles: Sequence[Outcome]) -> Picture:
 
 def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
     seen = [single for single in singles if single.detectable]
-    said = [item.named_names[0] if item.named else NOTHING_SAID for item in seen]
-    wrong = {name for item, name in zip(seen, said, strict=True) if name not in (NOTHING_SAID, item.names[0])}
+    answers = [item.named_names[0] if item.named else NO_ANSWER for item in seen]
+    wrong = {name for item, name in zip(seen, answers, strict=True) if name not in (NO_ANSWER, item.names[0])}
     names = sorted({item.names[0] for item in seen} | wrong)
-    columns = [*names, NOTHING_SAID]
+    columns = [*names, NO_ANSWER]
     counts = np.zeros((len(names), len(columns)))
-    for each, name in zip(seen, said, strict=True):
+    for each, name in zip(seen, answers, strict=True):
         counts[names.index(each.names[0]), columns.index(name)] += 1
     figure = new_figure(9.6, 2.2 + 0.23 * len(names))
     axes = figure.add_subplot()
@@ -97,7 +97,7 @@ def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
     return Picture(
         "confusion", "What was taken for what",
         "Devices with one concealed effect that shows; blue is right, red is not.", figure,
-        alternative=" ".join(f"{item.names[0]} named {name}." for item, name in zip(seen, said, strict=True)),
+        alternative=" ".join(f"{item.names[0]} named {name}." for item, name in zip(seen, answers, strict=True)),
     )  # fmt: skip
 
 

@@ -12,12 +12,12 @@ from analysis.figures.style import (
     BLACK,
     BLUE,
     GREY,
+    draw_no_data_note,
     name_panel_axes,
     new_figure,
     newton_ticks,
     panel_grid,
     plain_axes,
-    say_nothing_to_draw,
 )
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import TARGET
@@ -32,9 +32,11 @@ from analysis.psychophysics.hierarchy.observed_shares import (
 from protocols.procedure.staircase import to_db
 
 _LINE_IN = 2.2
+"""Height of a row of panels, inches."""
 _SMALLEST, _LARGEST = 2.5, 7.5
 """Marker sizes in points: of a single trial, and of `_MANY` or more."""
 _MANY = 100
+"""Number of trials from which a marker has its largest size."""
 
 
 def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
@@ -61,7 +63,7 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
     estimate, k = fit.persons[person], len(fit.frequencies_hz)
     played = [(place, shares) for place in range(k) if (shares := shares_of_person(answers, person, place))]
     if not played:
-        return say_nothing_to_draw(new_figure(4.0, 2.0), "There is no answer to draw.")
+        return draw_no_data_note(new_figure(4.0, 2.0), "There is no answer to draw.")
     figure, places = panel_grid(len(played), _LINE_IN)
     for axes, (place, shares) in zip(places, played, strict=False):
         levels = [10.0 ** (share.level_db / 20.0) for share in shares]

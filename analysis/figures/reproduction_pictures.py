@@ -22,7 +22,7 @@ def reproduction_pictures(
     direction_limit_hz: float,
     rows: EqualizedRows,
 ) -> Mapping[int, tuple[Picture, ...]]:
-    """Only what there is data for."""
+    """Draw the figures for which there are data."""
     return {
         1: (frequency_bands_picture(device.response, device.onset, bands, direction_limit_hz),),
         2: tuple(picture for picture in study_pictures(study) if picture.name == "thresholds"),

@@ -13,12 +13,12 @@ from analysis.figures.style import (
     GREY,
     PAGE_IN,
     VERMILLION,
+    draw_no_data_note,
     name_panel_axes,
     new_figure,
     newton_ticks,
     panel_grid,
     plain_axes,
-    say_nothing_to_draw,
 )
 from analysis.psychophysics.runs import Run
 from analysis.psychophysics.thresholds import RunEnd, Threshold, threshold_of
@@ -31,7 +31,7 @@ _LINE_IN = 2.2
 def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
     """One panel per run, by frequency. runs: of one participant."""
     if not runs:
-        return say_nothing_to_draw(new_figure(PAGE_IN, 2.0), "There is no run to draw.")
+        return draw_no_data_note(new_figure(PAGE_IN, 2.0), "There is no run to draw.")
     lowest_n = 0.75 * min([trial.staircase_n for run in runs for trial in run.answered], default=rule.start_n)
     ordered = sorted(runs, key=lambda run: (run.frequency_hz, run.session, run.run))
     figure, panels = panel_grid(len(ordered), _LINE_IN)

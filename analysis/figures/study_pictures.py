@@ -19,7 +19,7 @@ from analysis.psychophysics.threshold_table import ThresholdTable, threshold_tab
 
 
 def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult] = ()) -> tuple[Picture, ...]:
-    """Only what there is data for."""
+    """Draw the figures for which there are data."""
     pictures = []
     if any(row.complete for row in analysis.thresholds):
         pictures.append(_thresholds_picture(analysis))
@@ -59,7 +59,7 @@ def _thresholds_picture(analysis: StudyAnalysis) -> Picture:
 
 
 def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
-    """None where there is no other unit than newtons."""
+    """Draw the figures in other units; empty where newtons are the only unit."""
     tables = [table for table in _unit_tables(analysis) if any(v is not None for row in table.values for v in row)]
     if len(tables) < 2:
         return []

@@ -93,6 +93,6 @@ def power_of_ten(value: float) -> str:
     return "10" + f"{np.log10(value):.0f}".translate(_RAISED) if value > 0 else ""
 
 
-def say_nothing_to_draw(figure: Figure, sentence: str) -> Figure:
+def draw_no_data_note(figure: Figure, sentence: str) -> Figure:
     figure.text(0.5, 0.5, sentence, ha="center", va="center", fontsize=11, color=GREY)
     return figure

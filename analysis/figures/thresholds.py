@@ -10,11 +10,11 @@ from analysis.figures.style import (
     CUT_MARKER,
     GREY,
     PAGE_IN,
+    draw_no_data_note,
     new_figure,
     participant_colour,
     participant_marker,
     plain_axes,
-    say_nothing_to_draw,
 )
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.threshold_table import ThresholdTable
@@ -22,6 +22,7 @@ from analysis.psychophysics.threshold_table import ThresholdTable
 _SPREAD = 0.5
 """Width taken by the participants of one frequency, in steps between frequencies."""
 _LEGEND_LIMIT = 24
+"""Most participants for whom there is a legend."""
 _STOPPED_AT = 1.07
 """Height of the row of stopped runs, as a multiple of the cap."""
 
@@ -33,7 +34,7 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     """
     figure = new_figure(PAGE_IN, 4.2)
     if not table.subjects:
-        return say_nothing_to_draw(figure, "There is no completed run to draw.")
+        return draw_no_data_note(figure, "There is no completed run to draw.")
     axes = figure.add_subplot()
     plain_axes(axes)
     axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)

@@ -11,13 +11,14 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, new_figure, plain_axes, say_nothing_to_draw
+from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, draw_no_data_note, new_figure, plain_axes
 from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
 from equalizer.identification.frequency_response.octave_bins import OctaveBins, octave_bins
 from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _BIN_OCTAVES = 1 / 24
+"""Width of a bin in which lines are averaged for drawing, octaves."""
 _DIM = "#B8B8B8"
 _BAND = "#EEF3E6"
 
@@ -50,7 +51,7 @@ def draw_transfer_functions(
     response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
 ) -> Figure:
     if not len(response):
-        return say_nothing_to_draw(new_figure(8.6, 2.0), "There is no line to draw.")
+        return draw_no_data_note(new_figure(8.6, 2.0), "There is no line to draw.")
     outputs, inputs = response.response.shape[1:]
     figure = new_figure(8.6, 0.9 + 2.05 * outputs)
     grid = figure.subplots(outputs, inputs, sharex=True, sharey=True, squeeze=False)

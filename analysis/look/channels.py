@@ -30,7 +30,7 @@ class Channel:
 
     @property
     def known(self) -> FloatArray:
-        """Without missing samples."""
+        """The samples without missing ones."""
         return self.samples[np.isfinite(self.samples)]
 
     def format(self, value: float) -> str:

@@ -18,6 +18,6 @@ class Check:
     """Advice; empty where there is nothing to do."""
 
 
-def fine_if_none(name: str, found: tuple[Check, ...], seen: str) -> tuple[Check, ...]:
+def fine_if_none(name: str, found: tuple[Check, ...], text: str) -> tuple[Check, ...]:
     """The findings, or one check that says that there are none."""
-    return found or (Check(name, "fine", seen),)
+    return found or (Check(name, "fine", text),)

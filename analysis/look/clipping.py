@@ -18,6 +18,7 @@ CLIPPING = "clipping"
 LEAST_SAMPLES = 5
 """Samples at an extreme below which they are chance."""
 LEAST_RUNS = 2
+"""Fewest runs of equal readings at the top that count as clipping."""
 _STEPS = 3.0
 """Least extrapolated rise beyond the extreme, in steps of rounding."""
 SETTLES = 0.4
@@ -42,11 +43,11 @@ def _channel_checks(channel: Channel) -> tuple[Check, ...]:
         return ()
     ends = " and ".join(channel.format(sign * float(np.max(sign * channel.known))) for sign, _ in hit)
     count = sum(count for _, count in hit)
-    seen = f"{channel.label} is cut off at {ends}: {count} samples ({count / len(channel.samples):.2%}) lie there."
+    text = f"{channel.label} is cut off at {ends}: {count} samples ({count / len(channel.samples):.2%}) lie there."
     if channel.role == "command":
-        return (Check(CLIPPING, "notice", seen, "The command was limited: leave those stretches out, or drive less."),)
+        return (Check(CLIPPING, "notice", text, "The command was limited: leave those stretches out, or drive less."),)
     return (
-        Check(CLIPPING, "wrong", seen, "Record again with less drive or a wider range; leave those stretches out."),
+        Check(CLIPPING, "wrong", text, "Record again with less drive or a wider range; leave those stretches out."),
     )
 
 

@@ -30,8 +30,8 @@ def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Che
             ),
         )
     if recording.time_s is None:
-        said = (*_resampling_checks(recording), *_rate_checks(recording.sample_rate_hz))
-        return said or (Check(CLOCK, "fine", _clock_source(recording)),)
+        checks = (*_resampling_checks(recording), *_rate_checks(recording.sample_rate_hz))
+        return checks or (Check(CLOCK, "fine", _clock_source(recording)),)
     found = tuple(check for start, stop in stretches for check in _stamp_checks(recording, start, stop))
     return found or (Check(CLOCK, "fine", "All stamps are in their places."),)
 
@@ -57,8 +57,8 @@ def _clock_source(recording: Recording) -> str:
 
 def _resampling_checks(recording: Recording) -> tuple[Check, ...]:
     """Checks from an import's notes about uneven stamps."""
-    said = recording.meta.get("import")
-    notes = said.get("notes", ()) if isinstance(said, dict) else ()
+    origin = recording.meta.get("import")
+    notes = origin.get("notes", ()) if isinstance(origin, dict) else ()
     uneven = [str(note) for note in notes if "uneven stamps" in str(note)] if isinstance(notes, list) else []
     return tuple(
         Check(CLOCK, "notice", f"The import has evened it out: {note}", "Trust phases far below half the rate only.")
@@ -102,25 +102,25 @@ def _gap_check(steps: np.ndarray, gaps: np.ndarray, stamps: np.ndarray, rate_hz:
 
 
 def _jitter_check(jitter: float, most: float, step_s: float) -> Check | None:
-    seen = (
+    text = (
         f"Time stamps lie {jitter * step_s * 1e6:.3g} us rms off their places ({jitter:.1%} of a step), "
         f"{most * step_s * 1e6:.3g} us at most."
     )
     if jitter > WILD:
-        return Check(CLOCK, "wrong", seen, "Import with the stamps as the clock, and resample.")
+        return Check(CLOCK, "wrong", text, "Import with the stamps as the clock, and resample.")
     if jitter > JITTER:
         return Check(
-            CLOCK, "notice", seen, "Expect noise beside strong lines; resample by the stamps where it matters."
+            CLOCK, "notice", text, "Expect noise beside strong lines; resample by the stamps where it matters."
         )
-    return Check(CLOCK, "fine", seen)
+    return Check(CLOCK, "fine", text)
 
 
 def _drift_check(drift_ppm: float, rate_hz: float) -> Check | None:
     slower = "slower" if drift_ppm > 0 else "faster"
-    seen = f"By its stamps the clock is {abs(drift_ppm):.4g} ppm {slower} than {rate_hz:g} Hz."
+    text = f"By its stamps the clock is {abs(drift_ppm):.4g} ppm {slower} than {rate_hz:g} Hz."
     if abs(drift_ppm) > RATE_PPM:
         true_hz = rate_hz / (1 + drift_ppm * 1e-6)
-        return Check(CLOCK, "wrong", seen, f"State the rate as {true_hz:.6g} Hz, or import with the stamps.")
+        return Check(CLOCK, "wrong", text, f"State the rate as {true_hz:.6g} Hz, or import with the stamps.")
     if abs(drift_ppm) > DRIFT_PPM:
-        return Check(CLOCK, "notice", seen, "State the rate of the stamps where frequencies matter.")
-    return Check(CLOCK, "fine", seen)
+        return Check(CLOCK, "notice", text, "State the rate of the stamps where frequencies matter.")
+    return Check(CLOCK, "fine", text)

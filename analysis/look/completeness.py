@@ -49,14 +49,15 @@ def check_constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
 
 
 def _constant_check(channel: Channel) -> Check:
-    seen = f"{channel.label} is {channel.format(float(channel.known[0]))} throughout."
+    text = f"{channel.label} is {channel.format(float(channel.known[0]))} throughout."
     if channel.role == "command":
-        return Check(CONSTANT, "notice", seen, "Nothing can be said of what it drives; leave it out, or drive it.")
-    return Check(CONSTANT, "wrong", seen, "Check the cable and the map: a sensor that works is never so still.")
+        return Check(CONSTANT, "notice", text, "Nothing can be said of what it drives; leave it out, or drive it.")
+    return Check(CONSTANT, "wrong", text, "Check the cable and the map: a sensor that works is never so still.")
 
 
 def check_copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Check for copies, also scaled or shifted ones. An excitation equal to its command is none: nothing fed back."""
+    """Check for copies, also scaled or shifted ones. An excitation that equals its command is not a copy: nothing was
+    fed back."""
     found = tuple(_copy_checks(channels))
     return fine_if_none(COPIES, found, "No channel is a copy of another.")
 

@@ -13,6 +13,7 @@ from equalizer.signals.signal import FloatArray
 _WINDOWS = 12
 """Number of half-overlapping windows to aim for; with so many, half of a coherence of 0.1 is chance."""
 _SHORTEST, _LONGEST = 32, 8192
+"""Shortest and longest window, samples."""
 MOST_WINDOWS = 400
 """Largest number of windows that are averaged: more take time without benefit."""
 

@@ -120,8 +120,8 @@ def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tupl
         for name in idle
     ]
     found += [Check(DRIVEN, "wrong", sentence, "Correct the segments.") for sentence in silent_segments(recording)]
-    said = "; ".join(f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
-    return (*found, *((Check(DRIVEN, "fine", f"Command {said}."),) if said else ()))
+    text = "; ".join(f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
+    return (*found, *((Check(DRIVEN, "fine", f"Command {text}."),) if text else ()))
 
 
 def silent_segments(recording: Recording) -> tuple[str, ...]:
@@ -147,19 +147,19 @@ def coherence_checks(coherences: Sequence[ResponseCoherence], recording: Recordi
 
 
 def _coherence_check(coherence: ResponseCoherence, broad: bool) -> Check:
-    seen = (
+    text = (
         f"Of the power of response '{coherence.response}' in the driven band, {coherence.share:.1%} is linear in the "
         f"commands, least around {coherence.lowest_hz:.3g} Hz ({coherence.lowest:.0%})."
     )
     if coherence.share < POOR and broad:
         return Check(
-            COHERENCE, "wrong", seen, "Look for a wrong channel, a large time shift, or an input that was not recorded."
+            COHERENCE, "wrong", text, "Look for a wrong channel, a large time shift, or an input that was not recorded."
         )
     if coherence.share < LOW:
         return Check(
             COHERENCE,
             "notice",
-            seen,
+            text,
             "Expect noise, a nonlinearity, motion slower than a window, or an input that was not recorded.",
         )
-    return Check(COHERENCE, "fine", seen)
+    return Check(COHERENCE, "fine", text)

@@ -14,6 +14,7 @@ from equalizer.signals.signal import FloatArray
 _BLOCKS = 32
 """Means per half cycle: noise is averaged, corners stay sharp."""
 _HALF_CYCLES = 4
+"""Length, in half cycles, of the stretches in which the motion is compared with ramps or sinusoids."""
 _REVERSAL = 0.1
 """A turn counts as the end of a half cycle from this fraction of the range on."""
 _KEPT = 0.7

@@ -49,7 +49,7 @@ class KinematicPair:
 def find_kinematic_pairs(
     channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
 ) -> tuple[KinematicPair, ...]:
-    """For each speed and acceleration, the channel whose derivative agrees best with it, if any does."""
+    """Find, for each speed and acceleration, the channel whose derivative agrees best with it, if any does."""
     moving = [
         channel for channel in channels if channel.unit in _ORDER and channel.known.size and np.ptp(channel.known) > 0
     ]
@@ -103,23 +103,23 @@ def kinematic_checks(pairs: Sequence[KinematicPair], rate_hz: float) -> tuple[Ch
 def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
     agreed = pair.agreement
     late = _lag_text(agreed.lag_samples, rate_hz)
-    seen = (
+    text = (
         f"{pair.derivative} is {typeset(f'{agreed.factor:.4g}')} times {_WORDS[pair.order]} of {pair.place}{late} "
         f"(lines with {agreed.share:.0%} of its power)."
     )
     off = abs(abs(agreed.factor) - 1)
     if agreed.factor < 0:
-        return Check(KINEMATICS, "wrong", seen, f"Turn the sign of one of them{_cause_text(agreed.factor)}.")
+        return Check(KINEMATICS, "wrong", text, f"Turn the sign of one of them{_cause_text(agreed.factor)}.")
     if off > FAR and agreed.factor < 1 and agreed.lag_samples > LATE and not _cause_text(agreed.factor):
         # A wrong unit or factor delays nothing; what is weaker and later went through a filter or a flexible part.
-        return Check(KINEMATICS, "notice", seen, _FILTERED)
+        return Check(KINEMATICS, "notice", text, _FILTERED)
     if off > FAR:
-        return Check(KINEMATICS, "wrong", seen, f"Check the units and factors of both{_cause_text(agreed.factor)}.")
+        return Check(KINEMATICS, "wrong", text, f"Check the units and factors of both{_cause_text(agreed.factor)}.")
     if off > CLOSE:
-        return Check(KINEMATICS, "notice", seen, "Check the calibration of both, and filters between them.")
+        return Check(KINEMATICS, "notice", text, "Check the calibration of both, and filters between them.")
     if abs(agreed.lag_samples) > LATE:
-        return Check(KINEMATICS, "notice", seen, "A filter or a transfer delays one of them; shift it, or model it.")
-    return Check(KINEMATICS, "fine", seen)
+        return Check(KINEMATICS, "notice", text, "A filter or a transfer delays one of them; shift it, or model it.")
+    return Check(KINEMATICS, "fine", text)
 
 
 def _lag_text(lag: float, rate_hz: float) -> str:
@@ -152,6 +152,6 @@ def _lag_pairs(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: floa
         if agreed is None or agreed.share < SAME_SHARE or agreed.spread > SAME_SPREAD:
             continue
         late = _lag_text(agreed.lag_samples, rate_hz)
-        seen = f"{second.label} is {typeset(f'{agreed.factor:.4g}')} times {first.label}{late or ', at the same time'}."
+        text = f"{second.label} is {typeset(f'{agreed.factor:.4g}')} times {first.label}{late or ', at the same time'}."
         do = "Shift the later one, or model what delays it." if late else ""
-        yield Check(LAGS, "notice" if late else "fine", seen, do)
+        yield Check(LAGS, "notice" if late else "fine", text, do)

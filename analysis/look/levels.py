@@ -85,12 +85,12 @@ def _proportion_check(alike: Sequence[tuple[float, SegmentLevel]], response: int
         return None
     gains = [level.rms[response] / size for size, level in (weakest, strongest)]
     change = gains[1] / gains[0] - 1
-    seen = (
+    text = (
         f"From the weakest to the strongest {weakest[1].kind} ({strongest[0] / weakest[0]:.3g} times) the rms of "
         f"{channel.label} over that of the command changes by {typeset(f'{100 * change:+.3g}')} %."
     )
     if abs(change) < EVEN:
-        return Check(LEVELS, "fine", seen)
+        return Check(LEVELS, "fine", text)
     large = abs(change) > UNEVEN
     do = "The device is far from linear: friction, stops, hardening or saturation." if large else ""
-    return Check(LEVELS, "notice", seen, do or "The device, or its noise, is not quite in proportion.")
+    return Check(LEVELS, "notice", text, do or "The device, or its noise, is not quite in proportion.")

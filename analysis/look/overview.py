@@ -47,14 +47,14 @@ def _resolution_check(channel: Channel) -> Check | None:
     steps = rms(channel.known) / step if step else UNSEEN
     if steps >= UNSEEN:
         return None
-    seen = f"{channel.label} moves in steps of {channel.format(step)}; its rms is {steps:.3g} of them."
+    text = f"{channel.label} moves in steps of {channel.format(step)}; its rms is {steps:.3g} of them."
     if steps < COARSE:
-        return Check(RESOLUTION, "wrong", seen, "Use a finer sensor or range, or move more: rounding hides the motion.")
+        return Check(RESOLUTION, "wrong", text, "Use a finer sensor or range, or move more: rounding hides the motion.")
     if steps < ROUGH:
         return Check(
-            RESOLUTION, "notice", seen, "Do not differentiate it without a filter; expect rounding as a floor."
+            RESOLUTION, "notice", text, "Do not differentiate it without a filter; expect rounding as a floor."
         )
-    return Check(RESOLUTION, "fine", seen)
+    return Check(RESOLUTION, "fine", text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ _SMALLEST = {
 }  # fmt: skip
 """Rms below which a unit is doubted."""
 G, IN_G = 9.80665, (0.97, 1.03)
+"""Standard gravity in m/s², and the range of a mean reading that looks as if it were in units of it."""
 STRONG = 0.5
 """Mean over rms from which an offset is reported."""
 
@@ -46,13 +47,13 @@ def _unit_check(channel: Channel) -> Check | None:
         return _doubt_unit(channel, f"{channel.label} moves by {channel.format(moves)} rms.")
     mean = abs(float(known.mean()))
     if channel.unit == "m/s^2" and IN_G[0] < mean < IN_G[1] and moves < mean:
-        seen = f"{channel.label} rests at {channel.format(float(known.mean()))}, where an accelerometer shows {G:.2f}."
-        return Check(UNITS, "wrong", seen, "State the unit g in the map: the numbers look like multiples of gravity.")
+        text = f"{channel.label} rests at {channel.format(float(known.mean()))}, where an accelerometer shows {G:.2f}."
+        return Check(UNITS, "wrong", text, "State the unit g in the map: the numbers look like multiples of gravity.")
     return None
 
 
-def _doubt_unit(channel: Channel, seen: str) -> Check:
-    return Check(UNITS, "wrong", seen, f"Check the unit of {channel.label} in the map.")
+def _doubt_unit(channel: Channel, text: str) -> Check:
+    return Check(UNITS, "wrong", text, f"Check the unit of {channel.label} in the map.")
 
 
 def check_offsets(channels: Sequence[Channel]) -> tuple[Check, ...]:
@@ -72,11 +73,11 @@ def _offset_check(channel: Channel) -> Check | None:
     if not known.size or moves == 0 or abs(float(known.mean())) < STRONG * moves:
         return None
     mean = float(known.mean())
-    seen = f"{channel.label} stands {channel.format(mean)} beside zero ({abs(mean) / moves:.3g} times its rms)."
+    text = f"{channel.label} stands {channel.format(mean)} beside zero ({abs(mean) / moves:.3g} times its rms)."
     if channel.unit == "m/s^2" and abs(abs(mean) / G - 1) < 0.03:
-        return Check(OFFSETS, "fine", f"{seen} That is gravity.")
+        return Check(OFFSETS, "fine", f"{text} That is gravity.")
     if channel.role == "command":
-        return Check(OFFSETS, "notice", seen, "Linear models know no offset: say the working point, or take it off.")
+        return Check(OFFSETS, "notice", text, "Linear models know no offset: say the working point, or take it off.")
     return Check(
-        OFFSETS, "notice", seen, "Take it off where it is the sensor's; keep it where it is gravity or a load."
+        OFFSETS, "notice", text, "Take it off where it is the sensor's; keep it where it is gravity or a load."
     )

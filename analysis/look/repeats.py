@@ -15,19 +15,24 @@ from equalizer.signals.signal import FloatArray
 
 REPEATS = "repeats"
 SAME, UNLIKE = 0.02, 0.2
-"""Rms by which the command of declared periods may differ, as a share of it."""
+"""Rms difference of the command between declared periods, as a share of its rms: up to the first the period is right,
+above the second it is wrong, a doubt between."""
 LOUD = 0.3
+"""Rms noise of a channel between repeats, as a share of its mean period's rms, above which a notice is given."""
 
 
 @dataclass(frozen=True, slots=True)
 class RepeatNoise:
-    """Between periods of one segment."""
+    """Noise between the periods of one segment: rms deviation from the mean period."""
 
     segment: int
     """From 1; 0 where the period was found and not declared."""
     period: int
-    looks: int
+    """Length in samples."""
+    periods: int
+    """Number of periods compared."""
     settled: bool
+    """Whether the transient before the first period had decayed."""
     share: tuple[float, ...]
     """Rms between repeats over rms of the mean period, per response channel."""
 
@@ -57,9 +62,9 @@ def _noise_between_repeats(recording: Recording, *, declared: bool) -> tuple[Rep
     for periods in settled_periods(recording):
         if periods.count < 2:
             continue
-        looks = period_samples(recording.response.samples, periods)
-        mean = looks.mean(axis=0)
-        between = np.sqrt(np.sum((looks - mean) ** 2, axis=(0, 1)) / ((periods.count - 1) * periods.length))
+        by_period = period_samples(recording.response.samples, periods)
+        mean = by_period.mean(axis=0)
+        between = np.sqrt(np.sum((by_period - mean) ** 2, axis=(0, 1)) / ((periods.count - 1) * periods.length))
         sizes = np.array([rms(column) for column in mean.T])
         share = tuple((between / np.where(sizes > 0, sizes, np.inf)).tolist())
         number = periods.index + 1 if declared else 0
@@ -67,32 +72,32 @@ def _noise_between_repeats(recording: Recording, *, declared: bool) -> tuple[Rep
     return tuple(found)
 
 
-def repeat_checks(recording: Recording, seen: Repeats) -> tuple[Check, ...]:
+def repeat_checks(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
     wrong = [check for check in _period_checks(recording) if check is not None]
-    if seen.found:
-        times = (seen.found_in[1] - seen.found_in[0]) / seen.found
+    if repeats.found:
+        times = (repeats.found_in[1] - repeats.found_in[0]) / repeats.found
         wrong.append(
             Check(
                 REPEATS,
                 "notice",
-                f"The command repeats every {seen.found} samples ({seen.found / recording.sample_rate_hz:.4g} s), "
-                f"{times:.3g} times, but no segment says so.",
-                f"State period = {seen.found} in its segment: repeats tell noise from distortion.",
+                f"The command repeats every {repeats.found} samples "
+                f"({repeats.found / recording.sample_rate_hz:.4g} s), {times:.3g} times, but no segment says so.",
+                f"State period = {repeats.found} in its segment: repetition separates noise from distortion.",
             )
         )
-    if not seen.noise:
+    if not repeats.noise:
         none = "Nothing repeats, so noise cannot be told from what a model lacks."
         wrong += [] if wrong else [Check(REPEATS, "notice", none, "Record some periods more than once.")]
         return tuple(wrong)
-    return (*wrong, *_noise_checks(recording, seen.noise))
+    return (*wrong, *_noise_checks(recording, repeats.noise))
 
 
 def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[Check, ...]:
     channels = recording.response.channels
     shares = np.array([each.share for each in noise])
-    said = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
+    sentence = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
     loud = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
-    text = f"Between repeats (up to {max(each.looks for each in noise)}) remain at least {said}, rms."
+    text = f"Between repeats (up to {max(each.periods for each in noise)}) remain at least {sentence}, rms."
     do = f"{conjoin(loud)} hardly repeat: average more periods, or drive more." if loud else ""
     return (Check(REPEATS, "notice" if loud else "fine", text, do),)
 

@@ -12,6 +12,7 @@ from scipy.stats import binomtest
 from protocols.trial import Phase, Trial
 
 CONFIDENCE = 0.95
+"""Confidence of the interval of the lapse rate."""
 
 
 @dataclass(frozen=True, slots=True)

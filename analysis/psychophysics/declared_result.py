@@ -39,7 +39,7 @@ class ContrastResult:
 class DeclaredResult:
     primary: Literal["undeclared", "hierarchical", "published"]
     contrast_hz: tuple[float, ...]
-    """Of two frequencies; empty where none is declared."""
+    """The two frequencies of the contrast; empty where none is declared."""
     confidence: float
     results: tuple[ContrastResult, ...]
     """The declared analysis first, then the other; none without a declared contrast."""

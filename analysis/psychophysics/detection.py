@@ -48,11 +48,11 @@ def above_detection(direction: ThresholdTable, detection: ThresholdTable) -> Thr
         felt = [_felt(detection, subject, frequency_hz) for frequency_hz in direction.frequencies_hz]
         values.append(
             tuple(
-                None if told is None or from_n is None else to_db(told) - to_db(from_n)
-                for told, (from_n, _) in zip(row, felt, strict=True)
+                None if threshold is None or from_n is None else to_db(threshold) - to_db(from_n)
+                for threshold, (from_n, _) in zip(row, felt, strict=True)
             )
         )
-        cut.append(tuple(told or bound for told, (_, bound) in zip(bounds, felt, strict=True)))
+        cut.append(tuple(threshold or bound for threshold, (_, bound) in zip(bounds, felt, strict=True)))
     return replace(direction, quantity="above_detection_db", values=tuple(values), censored=tuple(cut), notes=())
 
 

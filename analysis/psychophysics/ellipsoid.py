@@ -96,7 +96,10 @@ def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None)
             raise ValueError(f"segment {number} (sine): the response has missing values")
         results.append(_result(samples, recording.sample_rate_hz, segment, about))
     if not results:
-        raise ValueError("the recording has no segment of kind sine, so there is no ellipsoid to compute")
+        raise ValueError(
+            "the recording has no segment of kind sine, so there is no ellipsoid to compute; "
+            "record sinusoids along several directions"
+        )
     return tuple(results)
 
 

@@ -24,7 +24,7 @@ class Delivery:
     """Off the direction over what was delivered along it."""
 
     @property
-    def as_wanted(self) -> bool:
+    def is_as_wanted(self) -> bool:
         return self.off_axis <= NEAR and all(abs(ratio - 1) <= NEAR for ratio in self.along if ratio is not None)
 
 
@@ -39,10 +39,10 @@ def deliveries(trials: Sequence[Trial]) -> tuple[Delivery, ...]:
 
 def delivery_warning(found: Sequence[Delivery]) -> str:
     """A warning that names the frequencies with deviations; empty where there are none."""
-    off = [delivery for delivery in found if not delivery.as_wanted]
+    off = [delivery for delivery in found if not delivery.is_as_wanted]
     if not off:
         return ""
-    said = [
+    texts = [
         f"{delivery.frequency_hz:g} Hz "
         f"({' and '.join(f'{100 * along:.0f} %' for along in delivery.along if along is not None)} "
         f"of what was wanted, {100 * delivery.off_axis:.0f} % off the direction)"
@@ -50,7 +50,7 @@ def delivery_warning(found: Sequence[Delivery]) -> str:
     ]
     return (
         f"The accelerations that arrived are not those that were wanted, by more than {100 * NEAR:.0f} % at the "
-        f"median: {conjoin(said)}. Take the delivered accelerations, not the levels, for what was felt there."
+        f"median: {conjoin(texts)}. Take the delivered accelerations, not the levels, for what was felt there."
     )
 
 

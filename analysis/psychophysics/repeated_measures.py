@@ -119,7 +119,7 @@ def greenhouse_geisser(rows: FloatArray) -> float:
 
 
 def huynh_feldt(epsilon: float, participants: int, conditions: int) -> float:
-    """From Greenhouse and Geisser's epsilon; may exceed 1, which means 1."""
+    """Huynh and Feldt's epsilon from Greenhouse and Geisser's; it may exceed 1, which means 1."""
     n, df = participants, conditions - 1
     return (n * df * epsilon - 2.0) / (df * (n - 1.0 - df * epsilon))
 

@@ -12,6 +12,7 @@ from analysis.wording import conjoin
 from protocols.trial import AT_WILL, Phase, Trial
 
 OFTEN_COUNT = 3
+"""Fewest repeats of a run's trials that give a warning."""
 OFTEN_RATE = 0.02
 """A cough or a noise comes once or twice in a run of some 60 presentations. Three, of at most 150, are a habit."""
 OFTEN_WORDS = f"at least {OFTEN_COUNT}, and at least {100 * OFTEN_RATE:g} % of them"

@@ -53,7 +53,8 @@ class PracticeRun:
 
 
 def practice_runs(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[PracticeRun, ...]:
-    """In the order in which they first occur. Practice has the phase TRAINING and follows the training staircases."""
+    """Runs of practice in the order in which they first occur. Practice has the phase TRAINING and follows the training
+    staircases."""
     first = len(protocol.training.frequencies_hz)
     places = range(first, first + len(protocol.practice.frequencies_hz))
     grouped: dict[tuple[str, str, int], list[Trial]] = {}
@@ -198,8 +199,8 @@ def _models(trials: Sequence[Trial], protocol: StudyProtocol) -> tuple[PrimaryAn
 def _mean_contrasts(
     rows: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
 ) -> tuple[tuple[Contrast, ...], tuple[Contrast, ...]]:
-    """Of reversal means, and by Tobit's model of them. At the frequencies of the model where there is one, so that all
-    compare with the same lowest frequency."""
+    """Contrasts of reversal means, and of Tobit's model of them; at the frequencies of the primary model where there is
+    one, so that all have the same lowest frequency as their reference."""
     frequencies_hz = primary.frequencies_hz if primary is not None else protocol.stimulus.frequencies_hz
     table = threshold_table(rows, frequencies_hz, "threshold_db")
     if not table.subjects or not table.frequencies_hz:
@@ -250,9 +251,9 @@ def _declared_document(result: DeclaredResult) -> dict[str, Any]:
 def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
     """The published analysis beside the one within participants, in words and numbers."""
     if anova.p is None or within.p is None:
-        said = "neither" if anova.p is None and within.p is None else "only one"
+        text = "neither" if anova.p is None and within.p is None else "only one"
         return (
-            f"The published analysis is one-way, between groups; the design is within participants. Of the two, {said} "
+            f"The published analysis is one-way, between groups; the design is within participants. Of the two, {text} "
             "can be computed from these data, so they cannot be compared."
         )
     agree = (anova.p < 0.05) == (within.p < 0.05)

@@ -66,7 +66,7 @@ class Threshold:
     repeats_at_will: int = 0
     """Presentations of the run that the participant made void; catch trials among them."""
     repeat_rate: float = 0.0
-    """Their share of all presentations of the run."""
+    """Share of void presentations in all presentations of the run."""
     asked_often: bool = False
     """See `analysis.psychophysics.repeated_trials.is_often`."""
 
@@ -189,3 +189,4 @@ def _mean_of_measured(values: Sequence[float | None]) -> float | None:
 
 
 _SAME_LEVEL = 1e-9
+"""Relative difference below which two levels are the same, rounding apart."""

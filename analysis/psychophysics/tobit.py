@@ -23,11 +23,11 @@ from analysis.psychophysics.group_contrasts import Contrast, holm_correction
 from equalizer.signals.signal import FloatArray
 
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(25)
-"""Of the integral over a person."""
+"""Gauss-Hermite rule of the integral over one person's latent mean."""
 SD_BOUNDS_DB = (-4.0, 3.5)
 """Logarithms of both standard deviations, in dB."""
 STEP = 1e-3
-"""Of the differences that give the curvature: dB, and logarithms."""
+"""Step of the finite differences that give the curvature: dB for means, logarithms for standard deviations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,9 +20,9 @@ def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap]) -> list[Sec
     """Empty where no trial was measured."""
     if not found:
         return []
-    said = (*(cue_warnings(found) or (_nothing(found),)), *filter(None, [gap_text(gaps)]))
+    sentences = (*(cue_warnings(found) or (_nothing(found),)), *filter(None, [gap_text(gaps)]))
     tables = (_ability_table(found), _answer_table(found))
-    return [Section("Was direction the cue?", paragraphs=(_MEANING, *said), tables=tables)]
+    return [Section("Was direction the cue?", paragraphs=(_MEANING, *sentences), tables=tables)]
 
 
 def _nothing(found: Sequence[CueFinding]) -> str:

@@ -30,14 +30,14 @@ _HEARD = 0.1
 
 def distortion_sections(found: Findings) -> list[Section]:
     """Empty where nothing was asked."""
-    seen = found.local.distortions
-    if not seen.cells and not seen.remarks:
+    measured = found.local.distortions
+    if not measured.cells and not measured.remarks:
         return []
     table = _distortion_table(found)
     return [
         Section(
             "What kind of distortion the device shows",
-            paragraphs=(*_trend_paragraphs(seen.cells), *seen.remarks),
+            paragraphs=(*_trend_paragraphs(measured.cells), *measured.remarks),
             tables=(table,) if table is not None else (),
         )
     ]

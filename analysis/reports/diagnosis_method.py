@@ -61,8 +61,8 @@ def _noise_paragraphs(found: Findings) -> tuple[str, ...]:
     if found.floor is None:
         return ()
     how = _HOW.get(found.floor.how)
-    said = f"The noise was measured {how}." if how else "The noise of this recording could not be measured."
-    return (" ".join([said, *found.floor.remarks]),)
+    text = f"The noise was measured {how}." if how else "The noise of this recording could not be measured."
+    return (" ".join([text, *found.floor.remarks]),)
 
 
 def _choice_paragraphs(found: Findings) -> tuple[str, ...]:

@@ -84,7 +84,7 @@ def _banner(found: Findings) -> str:
 
 
 def _answer_sections(found: Findings) -> list[Section]:
-    """Where physics was named: one sentence each, and what they leave open."""
+    """Sections of a diagnosis that names physics: one sentence for each effect, and what they leave open."""
     effects, signatures = found.diagnosis.effects, signature_texts(found)
     if not effects:
         return []
@@ -102,8 +102,8 @@ def _candidate_sections(found: Findings) -> list[Section]:
 
 
 def _black_box_sections(found: Findings) -> list[Section]:
-    said = black_box_sentence(found.black_box, bool(found.diagnosis.effects))
-    paragraphs = tuple(filter(None, (*ceiling_sentences(found.reached), said)))
+    text = black_box_sentence(found.black_box, bool(found.diagnosis.effects))
+    paragraphs = tuple(filter(None, (*ceiling_sentences(found.reached), text)))
     return [Section("A black box beside it", paragraphs=paragraphs)] if paragraphs else []
 
 
@@ -111,11 +111,11 @@ _NO_MAP = "There is no map: the noise of this recording is not known."
 
 
 def _localisation_section(found: Findings, pictures: Sequence[Picture]) -> Section:
-    said = localisation_sentences(found.local) if found.maps else (_NO_MAP,)
+    sentences = localisation_sentences(found.local) if found.maps else (_NO_MAP,)
     listed = mismatch_table("The places that differ most, as given", found.diagnosis.mismatch, found.is_timed)
     return Section(
         "Where model and device disagree",
-        paragraphs=said,
+        paragraphs=sentences,
         pictures=(*_select_pictures(pictures, "state"), *_select_pictures(pictures, "mismatch-map")),
         tables=(listed,),
     )
@@ -172,16 +172,16 @@ _UNMOVED = {
     False: "None had to move by more than the standard deviation of its calibration.",
     True: "None had to move by more than what the first fit left open.",
 }
-"""By whether the model was fitted to the recordings first."""
+"""Key: whether the model was fitted to the recordings first."""
 
 
 def _parameter_section(found: Findings) -> Section:
     moved = final_moved_numbers(found)
-    said = retuned_sentence(moved, found.fitted) or _UNMOVED[found.fitted]
+    text = retuned_sentence(moved, found.fitted) or _UNMOVED[found.fitted]
     table = retuned_table(found)
     return Section(
         "The model's own numbers",
-        paragraphs=(said,),
+        paragraphs=(text,),
         points=doubtful_sentences(moved, found.fitted),
         tables=(table,) if table is not None else (),
     )

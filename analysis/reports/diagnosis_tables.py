@@ -15,6 +15,7 @@ from analysis.wording import NONE, capitalise, end_sentence, p_value, signed_num
 
 _STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
 _MOST_PLACES = 12
+"""Most rows of the table of mismatches."""
 _SHARE = (
     "In order of how much of the channel's whole signal is missing. Share: mismatch over signal there; where a state "
     "is named, of the mismatch's power that sits in it."
@@ -79,7 +80,7 @@ def error_table(found: Findings) -> Table:
 
 
 def channel_table(found: Findings, part: Literal["fit", "test"]) -> Table | None:
-    """In each channel's unit, with the multiple of the noise; None where no series tells the channels."""
+    """Errors in each channel's unit, with the multiple of the noise; None where the series are not known by channel."""
     if not found.time_series:
         return None
     names, units, noises = found.time_series[0].channels, found.time_series[0].units, found.noise_rms

@@ -19,6 +19,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 
 CURVE_LINES = 400
+"""Points of a drawn curve."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

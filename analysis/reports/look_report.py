@@ -38,15 +38,15 @@ def pictures_of(found: Sequence[Overview]) -> tuple[tuple[Picture, ...], ...]:
 
 
 def brief(found: Overview) -> str:
-    """In a sentence: what was recorded, for how long, and what came of the checks."""
+    """One sentence: what was recorded, for how long, and the result of the checks."""
     recording = found.recording
     counts = {level: sum(check.level == level for check in found.checks) for level in ("wrong", "notice", "fine")}
-    said = (
+    text = (
         f"{found.name}: {recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, "
         f"{len(found.channels)} channels, {len(recording.segments)} segments; checks: {counts['wrong']} wrong, "
         f"{counts['notice']} to notice, {counts['fine']} fine."
     )
-    return said if recording.is_timed else untimed_text(said)
+    return text if recording.is_timed else untimed_text(text)
 
 
 def _sections(overview: Overview, pictures: Sequence[Picture], found: Sequence[Overview]) -> tuple[Section, ...]:

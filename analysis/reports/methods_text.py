@@ -57,13 +57,13 @@ def _task(protocol: StudyProtocol) -> str:
     trial, directions = protocol.trial, protocol.directions
     first, second, middle = (typeset(f"{directions.symmetry_deg + side:g}") for side in (45, -45, 0))
     limit = f"within {trial.time_limit_s:g} s" if trial.time_limit_s else "without a limit of time"
-    told = "was told" if trial.feedback == "after_answer" else "was not told"
+    text = "was told" if trial.feedback == "after_answer" else "was not told"
     return (
         f"Every trial played one {_PLAYED[protocol.stimulus.quantity]} along one of two orthogonal directions, at "
         f"{first}° (1) and "
         f"{second}° (2) in the {directions.plane} plane, mirrored about the linkage's line of symmetry at "
         f"{middle}°. The direction was {_DRAWS[protocol.schedule.directions]}. The participant said "
-        f"which of the two it was, {limit}, and {told} whether that was right."
+        f"which of the two it was, {limit}, and {text} whether that was right."
         + (
             " A void trial came again with the same stimulus: after pauses and faults, and where the participant asked "
             f"for it, at most {trial.repeats_per_run} times in a run. (Sessions begun before this rule drew a new one.)"

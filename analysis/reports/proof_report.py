@@ -8,7 +8,7 @@ from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Outcome
 from analysis.evaluation.proof.score import Score
 from analysis.evaluation.proof.share import Figure
-from analysis.evaluation.proof.wording import concealed_text, figure_text, said_text, strength_text
+from analysis.evaluation.proof.wording import answer_text, concealed_text, figure_text, strength_text
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
 
@@ -110,7 +110,7 @@ def _miss_table(misses: Sequence[Outcome]) -> Table:
     rows = tuple(
         (
             str(miss.number), f"{miss.kind}, {miss.bank}", concealed_text(miss), strength_text(miss) or "-",
-            said_text(miss), f"{miss.left('retuned'):.2f}", f"{miss.left('after'):.2f}",
+            answer_text(miss), f"{miss.left('retuned'):.2f}", f"{miss.left('after'):.2f}",
         )
         for miss in misses
     )  # fmt: skip

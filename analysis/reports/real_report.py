@@ -103,7 +103,7 @@ def _section(real_answer: RealAnswer, picture: Picture | None) -> Section:
         *_pair_points(real_answer.pair),
     )
     further = tuple(_further_sentence(*test) for test in _further_tests(real_answer))
-    objections = tuple(f"An expert would object: {said}" for said in real_answer.objections)
+    objections = tuple(f"An expert would object: {objection}" for objection in real_answer.objections)
     paragraphs = (
         *((real_answer.title,) if real_answer.title else ()),
         real_answer.answer,
@@ -140,13 +140,13 @@ def _tables(real_answer: RealAnswer) -> tuple[Table, ...]:
 
 def number_sentence(number: OwnNumber) -> str:
     ends = None if number.low is None or number.high is None else (number.low, number.high)
-    said = f"The model's {number.name} is {value_text(number.value, number.unit, ends)} after everything"
+    text = f"The model's {number.name} is {value_text(number.value, number.unit, ends)} after everything"
     if number.nominal is None:
-        return f"{said}."
+        return f"{text}."
     off = 100 * (number.value / number.nominal - 1)
     inside = {True: ", and the interval holds it", False: ", and the interval does not hold it", None: ""}
     known = value_text(number.nominal, number.unit)
-    return f"{said}; known by other means is {known}, {typeset(f'{off:+.2g}')} % off{inside[number.holds_nominal]}."
+    return f"{text}; known by other means is {known}, {typeset(f'{off:+.2g}')} % off{inside[number.holds_nominal]}."
 
 
 def _pair_points(pair: PairOutcome | None) -> tuple[str, ...]:

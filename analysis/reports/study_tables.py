@@ -68,7 +68,7 @@ def _coverage(analysis: StudyAnalysis) -> tuple[str, ...]:
 
 
 def one_way_table(analysis: StudyAnalysis) -> Table:
-    """Without rows where nothing can be computed: the notes say why."""
+    """Table of the one-way ANOVA; without rows where nothing can be computed: the notes say why."""
     anova = analysis.anova
     rows: tuple[tuple[str, ...], ...] = ()
     effect: tuple[str, ...] = ()
@@ -112,7 +112,7 @@ def pair_table(analysis: StudyAnalysis) -> Table:
 
 
 def within_table(analysis: StudyAnalysis) -> Table:
-    """Only the tests that can be computed: the notes say why others cannot."""
+    """Table of the repeated-measures tests that can be computed: the notes say why others cannot."""
     within, ranks = analysis.within, analysis.ranks
     rows: list[tuple[str, ...]] = []
     effects = []

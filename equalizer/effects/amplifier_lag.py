@@ -10,6 +10,7 @@ from equalizer.effects.starts.response_starts import starts_for_lateness
 from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
+"""Range of time constants that are tried as starts."""
 
 
 def _lag_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:

@@ -18,10 +18,10 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    seen = missing_mass(evidence, axis)
+    missing = missing_mass(evidence, axis)
     natural = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
     starts = []
-    for each in likely_oscillators(seen, axis, natural, RATIOS)[:2]:
+    for each in likely_oscillators(missing, axis, natural, RATIOS)[:2]:
         wave = 2 * np.pi * each.natural_hz
         damping, stiffness = 2 * each.damping_ratio * each.mass * wave, each.mass * wave**2
         starts.append({"mass": each.mass, "damping": damping, "stiffness": stiffness})

@@ -9,10 +9,13 @@ from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 WINDOW_S, LEAST_WINDOWS = 2.0, 4
+"""Length of the windows in which the delay is measured, and fewest of them for a slope."""
 LONGEST_S = 0.1
 """Largest time shift (s) of a window that is searched for."""
 LARGEST_PPM = 2e4
+"""Largest drift: beyond it the sample rate is wrong, not the clock."""
 LEAST_SIGMA = 5.0
+"""Least drift in its standard errors for it to be tried."""
 
 
 def _read_drifting(

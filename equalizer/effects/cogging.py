@@ -15,6 +15,7 @@ CELLS = 4096
 PITCHES = 3
 """Number of pitches that are tried, strongest peak of the periodogram first."""
 _FINER = 8
+"""Points of the spectrum per line of the position's grid."""
 
 
 @compile_law

@@ -9,7 +9,9 @@ from equalizer.signals.signal import FloatArray
 
 FROM = ("from_next", "from_after_next")
 LARGEST = 1.0
+"""Largest share of another channel: beyond it the channels would be exchanged."""
 LEAST = 1e-4
+"""Least share that is tried."""
 
 
 def _next_channels(channel: int, channels: int) -> list[int]:

@@ -206,7 +206,9 @@ def _force_action(law: Law, channels: Channels, samples: FloatArray | None = Non
         if model.inputs != axes:
             raise ValueError(f"the law {law.text} is for {axes} axes; the model has {model.inputs}")
         if needed and not len(table):
-            raise ValueError(f"the law {law.text} needs conditions that were not recorded")
+            raise ValueError(
+                f"the law {law.text} needs conditions that were not recorded; record them, or leave the law out"
+            )
         head = [axes, heavy, conditions if len(table) else 0, len(table), rate_hz]
         numbers = program.with_numbers(law_with_values(law, values).numbers)
         return np.concatenate([head, table.ravel(), numbers])

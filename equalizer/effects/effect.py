@@ -114,7 +114,7 @@ class OnResponse:
     stage: int = 0
     """Order among the effects on one side of the low pass: alignment, range, added signals, number format, clock."""
     shared: bool = False
-    """It affects all channels; it cannot affect a single one."""
+    """Whether the effect acts on all channels together; it cannot act on a single one."""
     of_whole: bool = False
     """Whether it depends on the recording's length, which must then be given for an excerpt."""
     bandwidth_hz: Callable[[float, Values], float] | None = None

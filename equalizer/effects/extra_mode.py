@@ -15,6 +15,7 @@ from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 LOWEST_HZ, STARTS = 2.0, 2
+"""Lowest resonance that is tried, and number of modes that are suggested."""
 RATIOS = (0.01, 0.04, 0.12)
 """Damping ratios to start from."""
 FINER, COARSER = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)
@@ -33,17 +34,17 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    seen, starts = missing_mass(evidence, axis), []
+    missing, starts = missing_mass(evidence, axis), []
     natural = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
     for _ in range(STARTS):
-        coarse = likely_oscillators(seen, axis, natural, RATIOS)[:1]
+        coarse = likely_oscillators(missing, axis, natural, RATIOS)[:1]
         for each in coarse:
             near = likely_oscillators(
-                seen, axis, (each.natural_hz * FINER).tolist(), (each.damping_ratio * COARSER).tolist()
+                missing, axis, (each.natural_hz * FINER).tolist(), (each.damping_ratio * COARSER).tolist()
             )
             starts.append(_mode_values(near[0], axis, evidence.model.inputs))
             # The next mode is searched for in the residual of this one.
-            seen = subtract_oscillator(seen, near[0])
+            missing = subtract_oscillator(missing, near[0])
     return tuple(starts)
 
 

@@ -7,6 +7,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST = 1e-4
+"""Least deviation of a gain from 1 that is tried."""
 
 
 def _scale_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:

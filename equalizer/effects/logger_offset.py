@@ -9,7 +9,9 @@ from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 LONGEST_S = 1.0
+"""Largest offset between the loggers."""
 LEAST_SAMPLES = 1e-3
+"""Least offset that is tried, in samples."""
 
 
 def _read_shifted(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:

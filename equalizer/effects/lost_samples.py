@@ -16,8 +16,11 @@ from equalizer.signals.signal import FloatArray
 CLEAR = 4.0
 """Difference of two samples, in units of the noise, above which it is clear which of them was read."""
 LEAST_EVENTS = 8
+"""Fewest repeated readings that count as lost samples."""
 LARGEST = 0.3
+"""Largest fraction of lost samples."""
 ROUNDS = 4
+"""Passes that refine which samples are lost."""
 CONTROL = 3.0
 """Negative control: repeats must be this many times as frequent as samples that equal the next one, which no physical
 cause produces."""

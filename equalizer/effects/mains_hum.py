@@ -10,10 +10,13 @@ from equalizer.effects.starts.response_starts import shares_of
 from equalizer.signals.signal import FloatArray
 
 MAINS_HZ = (45.0, 65.0)
+"""Range of mains frequencies, searched before all others."""
 ABOVE = 12.0
 """Least ratio of a tone's power to the spectrum's local median."""
 NEIGHBOURS_HZ = 3.0
+"""Lines this near to the hum's are not counted as background."""
 ROUNDS = 4
+"""Gauss-Newton steps for the frequency."""
 BLOCKS, STEADY = 12, 0.8
 """Number of blocks in which a tone must have the same amplitude and phase, and the least constancy (0 to 1)."""
 PLAYED = 0.1

@@ -47,7 +47,8 @@ def model_effects(
 
 
 def place_of_effect(effect: Effect) -> Place:
-    """Where an effect sits (mechanism, hand, actuator, sensor); of a discovered law, by what it acts on."""
+    """Place where an effect sits (mechanism, hand, actuator, sensor); for a discovered law, by the quantity it acts
+    on."""
     return EFFECTS_BY_NAME[effect.name].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
 
 

@@ -8,6 +8,7 @@ from equalizer.effects.starts.response_starts import shares_of
 from equalizer.signals.signal import FloatArray
 
 LEAST_SIGMA = 5.0
+"""Least drift in its standard errors for it to be tried."""
 STEEPEST = 3.0
 """Bounds of the quadratic term and of the offset at the beginning, as shares of the total drift."""
 

@@ -8,6 +8,7 @@ from equalizer.effects.starts.response_starts import channels_of
 from equalizer.signals.signal import FloatArray
 
 LEAST = 1e-4
+"""Least deviation of a gain from 1 that is tried."""
 
 
 def _scale_response(

@@ -13,7 +13,9 @@ from equalizer.signals.signal import FloatArray
 
 ABOUT = ("about_x", "about_y", "about_z")
 LARGEST_DEG = 120.0
+"""Largest angle: below half a turn the rotation vector is unique."""
 LEAST_DEG = 0.01
+"""Least angle that is tried."""
 
 
 def _rotate_response(

@@ -19,7 +19,7 @@ _MORE = 1.2
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """With the friction at the step's mean velocity, which itself depends on the force."""
+    """Solve for the friction at the step's mean velocity, which itself depends on the force."""
     mean, force, start = at[V], 0.0, memory[0]
     for _ in range(3):
         level = numbers[0] + (numbers[1] - numbers[0]) * np.exp(-((mean / numbers[2]) ** 2))

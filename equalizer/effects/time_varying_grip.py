@@ -14,7 +14,9 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 FASTEST_HZ, STARTS = 15.0, 2
+"""Fastest variation of a grip (a tremor is slower), and number of suggestions."""
 _FINER = 16
+"""Zero padding of the spectrum: points per line."""
 
 
 @compile_law
@@ -102,9 +104,9 @@ def _likely_rates(force: FloatArray, drag: FloatArray, rate: float) -> list[floa
     normal[:, 0, 2] = normal[:, 2, 0] = square[: last + 1].real
     normal[:, 1, 1], normal[:, 2, 2] = (whole - twice.real) / 2, (whole + twice.real) / 2
     normal[:, 1, 2] = normal[:, 2, 1] = twice.imag / 2
-    seen = np.stack([np.full(last + 1, against[0].real), against.imag, against.real], axis=1)
+    columns = np.stack([np.full(last + 1, against[0].real), against.imag, against.real], axis=1)
     normal += 1e-6 * whole * np.eye(3)
-    power = np.sum(seen * np.linalg.solve(normal, seen[:, :, None])[:, :, 0], axis=1)
+    power = np.sum(columns * np.linalg.solve(normal, columns[:, :, None])[:, :, 0], axis=1)
     power[:_FINER] = -np.inf
     rates = []
     for _ in range(STARTS):

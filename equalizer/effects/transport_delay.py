@@ -10,6 +10,7 @@ from equalizer.effects.starts.response_starts import starts_for_lateness
 from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
+"""Range of delays that are tried as starts."""
 BEYOND = 0.15
 """Share of the hold time. An acceleration follows a force without delay, so that the misfit jumps where the delay
 passes a whole number of hold times, which a gradient search does not cross."""

@@ -31,7 +31,8 @@ TILTED = {"extra_mode": ("tilt_next", "tilt_after_next")}
 def with_turned_commands(
     model: MechanicalModel, signs: Sequence[float], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> MechanicalModel:
-    """To the command times `signs`, 1 or -1 each, it answers as `model` does to the command. Raises PlacingError."""
+    """Return the model whose answer to the command times `signs`, 1 or -1 each, is that of `model` to the command.
+    Raises PlacingError."""
     way = np.asarray(signs, dtype=np.float64)
     effects = [each for effect in model.effects for each in _turned_effects(model, effect, way, (inputs, outputs))]
     return replace(model, input=model.input * way, effects=tuple(effects))

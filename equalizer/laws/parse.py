@@ -45,7 +45,7 @@ class _Reader:
     def read(self, node: ast.expr) -> Node:
         self.count += 1
         if self.count > LARGEST:
-            raise LawError(f"the law has more than {LARGEST} parts")
+            raise LawError(f"the law has more than {LARGEST} parts; shorten it")
         match node:
             case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
                 return self._number(node, value)
@@ -119,7 +119,7 @@ def parse_formula(text: str, template: bool = False) -> tuple[Node, tuple[float,
     try:
         return reader.read(body), tuple(reader.numbers)
     except RecursionError as error:
-        raise LawError("the law is nested too deeply") from error
+        raise LawError("the law is nested too deeply; write it with fewer brackets") from error
 
 
 def _not_python(text: str, error: BaseException) -> str:

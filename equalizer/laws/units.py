@@ -8,6 +8,7 @@ from equalizer.signals.unit_system import LINEAR, UnitSystem
 Dimension = tuple[float, float, float]
 """Powers of the unit of force, of position, and of the second."""
 NONE: Dimension = (0.0, 0.0, 0.0)
+"""Dimensions as exponents of force, length and time."""
 FORCE: Dimension = (1.0, 0.0, 0.0)
 SECOND: Dimension = (0.0, 0.0, 1.0)
 

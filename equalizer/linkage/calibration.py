@@ -1,4 +1,4 @@
-"""What a device says of its linkage over a grid of positions, and what of it is refused.
+"""Calibration of a linkage: what a device reports over a grid of positions, and which readings are refused.
 
 J is of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong, Hutchinson,
 Vidyasagar, Robot Modeling and Control, chapter 4).
@@ -11,38 +11,37 @@ from typing import Any
 
 import numpy as np
 
+from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
 
 MOST_CONDITION = 50.0
-"""Of J. Usable places of a delta device have some units; the simulated omega.3 stays below 2.2."""
+"""Largest condition number of J. At usable places of a delta device it is a few units; the simulated omega.3 stays
+below 2.2."""
 MOST_SKEW = 1e-3
 """|M - M^T| over |M|: more than rounding."""
 MASSES_KG = (1e-3, 20.0)
-"""Of handles on a desk, along any direction."""
+"""Range of plausible effective masses of a handle on a desk, along any direction."""
 MOST_DIFFERENCE = 0.05
 """J against finite differences. Another unit or convention gives at least 40 %, a forgotten arm's length some 10 %."""
 
 DEGREES = (4, 3, 2, 1)
+"""Degrees of the polynomial, tried from the highest: the first with enough positions is taken."""
 SPARE = 2
 """Times as many positions as terms: below it a lower degree is taken."""
 NEAR_SHARE = 0.3
-"""Of the calibration's reach: standard deviation of the weight around a place. Without one, far positions bend the
-slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
+"""Standard deviation of the Gaussian weight around a place, as a share of the calibration's reach. Without a weight,
+far positions bend the slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
 MOST_TOLD = 10
 """Problems at positions that are told one by one."""
 
 
-class CalibrationError(ValueError):
+class CalibrationError(ListedProblemsError):
     """Readings that cannot be those of a linkage. `problems`: one sentence each."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkageReading:
-    """At one position of the handle."""
+    """What a device says of its linkage at one position of the handle."""
 
     position_m: FloatArray
     """(3,)"""
@@ -128,8 +127,8 @@ def reading_problems(reading: LinkageReading, gravity_known: bool = True) -> Ite
     """One sentence each."""
     where = "(" + ", ".join(f"{1000 * each:.0f}" for each in reading.position_m) + ") mm"
     jacobian, inertia = reading.jacobian, reading.inertia_kg
-    told = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
-    for name, values in (told | {"Jacobian": jacobian, "inertia": inertia}).items():
+    vectors = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
+    for name, values in (vectors | {"Jacobian": jacobian, "inertia": inertia}).items():
         if not np.isfinite(values).all():
             yield f"at {where} the {name} holds what is no number"
     if not (np.isfinite(jacobian).all() and np.isfinite(inertia).all()):
@@ -165,4 +164,6 @@ def inertia_about(calibration: LinkageCalibration, place_m: FloatArray) -> tuple
             found = np.linalg.lstsq(terms, weights * calibration.inertia_kg.reshape(-1, 9), rcond=None)[0]
             linear = [powers.index((axis == 0, axis == 1, axis == 2)) for axis in range(3)]
             return found[powers.index((0, 0, 0))].reshape(3, 3), found[linear].reshape(3, 3, 3) / reach_m
-    raise ValueError(f"{len(away)} positions do not tell how the inertia changes: it takes eight in space")
+    raise ValueError(
+        f"{len(away)} positions do not tell how the inertia changes: read at least eight, not in one plane"
+    )

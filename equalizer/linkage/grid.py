@@ -15,7 +15,7 @@ STEP_M = 2e-3
 """Half the distance of a difference: some 200 counts of an encoder, and still a small part of an arm."""
 
 MOST_OFF_DEG = 5.0
-"""Of an arm from its place at a third of a turn."""
+"""Largest deviation of an arm from its nominal place at a third of a turn."""
 
 
 def arm_azimuths(jacobian: FloatArray) -> FloatArray:
@@ -32,8 +32,8 @@ def arm_azimuths(jacobian: FloatArray) -> FloatArray:
     ideal = turned + thirds * 2 * math.pi / 3
     off_deg = np.degrees(np.abs(outwards - ideal)).max()
     if len(set(thirds.astype(int) % 3)) < 3 or off_deg > MOST_OFF_DEG:
-        told = ", ".join(f"{each:.0f}" for each in np.degrees(outwards))
-        raise CalibrationError((f"the arms lie at {told} degrees; those of a delta device are 120 degrees apart",))
+        text = ", ".join(f"{each:.0f}" for each in np.degrees(outwards))
+        raise CalibrationError((f"the arms lie at {text} degrees; those of a delta device are 120 degrees apart",))
     azimuths: FloatArray = np.angle(np.exp(1j * ideal))
     return azimuths
 

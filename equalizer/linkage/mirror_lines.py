@@ -14,10 +14,11 @@ WARN_FROM = 0.02
 """Relative difference of inertia: moves an acceleration by 2 %, a fifth of the staircases' finest step (1 dB)."""
 
 NEAR_M = 1e-6
+"""Distance below which two positions are the same."""
 ODD_SHARE = 0.5
 """Below this share of the others' asymmetry a line is one that holds: its own arm is the odd one."""
 UPRIGHT = 1e-3
-"""Of the y component of a line's direction: gravity lies in its plane."""
+"""Largest y component of a line's direction for it to count as upright: gravity then lies in its mirror plane."""
 
 
 def reflection(azimuth_rad: float) -> FloatArray:
@@ -28,8 +29,8 @@ def reflection(azimuth_rad: float) -> FloatArray:
 
 
 def line_asymmetry(readings: list[LinkageReading], azimuths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """By line, (3,): largest |M(R p) - R M(p) R| over |M(p)| (spectral norms) of all readings with a mirror image,
-    0 without any; and positions (3, 3) where it is largest, m."""
+    """For each line, (3,): largest |M(R p) - R M(p) R| over |M(p)| (spectral norms) of all readings with a mirror
+    image, 0 without any; and positions (3, 3) where it is largest, m."""
     worst, where = np.zeros(3), np.zeros((3, 3))
     positions = np.array([reading.position_m for reading in readings])
     for line, azimuth in enumerate(azimuths):

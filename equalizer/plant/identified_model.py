@@ -7,17 +7,14 @@ from typing import Any, Self
 import numpy as np
 
 from equalizer.plant.model_quality import ModelQuality
+from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summarised, Summary, span_text
 from equalizer.signals.units import UnknownUnitError, parse_unit
 
 
-class IdentifiedModelError(ValueError):
+class IdentifiedModelError(ListedProblemsError):
     """A model that contradicts itself. `problems`: one sentence each."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)

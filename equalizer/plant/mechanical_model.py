@@ -12,6 +12,7 @@ import numpy as np
 
 from equalizer.laws.law import Law
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
+from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summarised, Summary
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, system_of
@@ -23,12 +24,8 @@ DERIVATIVE_OF_QUANTITY = {
 """Quantities that a response may have, as the order of the coordinates' time derivative."""
 
 
-class MechanicalModelError(ValueError):
+class MechanicalModelError(ListedProblemsError):
     """A model that contradicts itself or the format. `problems`: one sentence each."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,17 +173,17 @@ def _matrix_problems(model: MechanicalModel) -> Iterator[str]:
         "mass": (n, n), "damping": (n, n), "stiffness": (n, n),
         "input": (n, *model.input.shape[1:2]), "output": (model.output.shape[0], n),
     }  # fmt: skip
-    sound = True
+    valid = True
     for name, shape in shapes.items():
         matrix: FloatArray = getattr(model, name)
         if matrix.ndim != 2 or matrix.shape != shape or 0 in matrix.shape:
             wanted = {"input": f"({n}, inputs)", "output": f"(outputs, {n})"}.get(name, f"({n}, {n})")
             yield f"model.{name} has shape {matrix.shape}, but must have {wanted}: mass is {n} rows high"
-            sound = False
+            valid = False
         elif not np.isfinite(matrix).all():
             yield f"model.{name} holds values that are not finite numbers"
-            sound = False
-    if sound:
+            valid = False
+    if valid:
         yield from _mass_problems(model.mass)
 
 

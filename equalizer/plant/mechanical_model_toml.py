@@ -96,8 +96,8 @@ def mechanical_model_toml(model: MechanicalModel) -> str:
 
 def _read_units(origin: Mapping[str, Any]) -> UnitSystem | None:
     """The provenance with the units of numbers that are not in SI, as this program writes it."""
-    said = origin.get(UNITS)
-    words = {key: value for key, value in said.items() if isinstance(value, str)} if isinstance(said, dict) else {}
+    stored = origin.get(UNITS)
+    words = {key: value for key, value in stored.items() if isinstance(value, str)} if isinstance(stored, dict) else {}
     return (
         UnitSystem(words["force"], words["length"], words.get("time", "s"))
         if {"force", "length"} <= set(words)

@@ -74,7 +74,7 @@ def quality_sentence(quality: ModelQuality | None) -> str:
 
 
 def quality_document(quality: ModelQuality | None) -> dict[str, Any] | None:
-    """As values for JSON output; None = not stored."""
+    """The quality as values for JSON output; None = not stored."""
     return None if quality is None else asdict(quality) | {"remarks": list(quality.remarks)}
 
 

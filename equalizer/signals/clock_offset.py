@@ -12,6 +12,7 @@ IntArray = npt.NDArray[np.signedinteger]
 BoolArray = npt.NDArray[np.bool_]
 
 LEAST_CORRELATION = 0.5
+"""Least correlation of two signals for their offset to be trusted."""
 RIVAL = 0.98
 """Height of a second peak, relative to the highest, at which the offset is ambiguous."""
 
@@ -43,15 +44,17 @@ def offset_by_correlation(reference: Samples, other: Samples, about_s: float, wi
     offsets_s = reference.times_s[0] - other.times_s[0] + lags / rate_hz
     allowed = (np.abs(offsets_s - about_s) <= within_s) & _has_enough_overlap(lags, len(first), len(second))
     if allowed.sum() < 8:
-        raise NoOffsetError("the two signals do not overlap within the range of offsets that is searched")
+        raise NoOffsetError("the two signals do not overlap within the range of offsets that is searched; widen it")
     offsets_s, correlation = offsets_s[allowed], correlation[allowed]
     peak = int(np.argmax(np.abs(correlation)))
     best = abs(correlation[peak])
     if best < LEAST_CORRELATION:
-        raise NoOffsetError(f"the two signals agree nowhere (highest correlation {best:.2f})")
+        raise NoOffsetError(
+            f"the two signals agree nowhere (highest correlation {best:.2f}); give two signals of the same quantity"
+        )
     if not 0 < peak < len(correlation) - 1:
         raise NoOffsetError(
-            f"the two signals agree best at the end of the range that is searched ({offsets_s[peak]:g} s)"
+            f"the two signals agree best at the end of the range that is searched ({offsets_s[peak]:g} s); widen it"
         )
     _refuse_rivals(offsets_s, np.abs(correlation), peak)
     return _interpolate_peak(offsets_s, correlation, peak)
@@ -80,7 +83,7 @@ def _normalised_correlation(first: FloatArray, second: FloatArray) -> FloatArray
 
 
 def _has_enough_overlap(lags: IntArray, first: int, second: int) -> BoolArray:
-    """At which lags signals of these lengths overlap by a quarter of the shorter one."""
+    """Mask of the lags at which signals of these lengths overlap by at least a quarter of the shorter one."""
     overlap = np.minimum(first, lags + second) - np.maximum(0, lags)
     enough: BoolArray = overlap >= 0.25 * min(first, second)
     return enough

@@ -34,7 +34,7 @@ def apply_fades(samples: FloatArray, fade_in: int, fade_out: int) -> FloatArray:
     """Raised-cosine rise over the first `fade_in` and fall over the last `fade_out` samples. samples: (n, ...)."""
     n = samples.shape[0]
     if fade_in + fade_out > n:
-        raise ValueError(f"fades of {fade_in} and {fade_out} samples do not fit into {n}")
+        raise ValueError(f"fades of {fade_in} and {fade_out} samples do not fit into {n}; shorten them")
     envelope = np.ones(n)
     envelope[:fade_in] = 0.5 - 0.5 * np.cos(np.pi * np.arange(fade_in) / max(fade_in, 1))
     envelope[n - fade_out :] = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, fade_out + 1) / max(fade_out, 1))

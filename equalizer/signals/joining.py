@@ -16,7 +16,7 @@ def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
     Raises ValueError for no parts, or for parts of different devices, rates or channels.
     """
     if not parts:
-        raise ValueError("there is nothing to join")
+        raise ValueError("there is nothing to join; give at least one recording")
     first = parts[0]
     for part in parts[1:]:
         if (part.device, part.sample_rate_hz) != (first.device, first.sample_rate_hz):
@@ -32,11 +32,11 @@ def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
     ]
     return Recording(
         device=first.device,
-        command=_concatenate([part.command for part in parts]),
-        response=_concatenate([part.response for part in parts]),
-        position=_concatenate_if_all([part.position for part in parts]),
-        excitation=_concatenate_if_all([part.excitation for part in parts]),
-        condition=_concatenate_if_all([part.condition for part in parts]),
+        command=concatenate([part.command for part in parts]),
+        response=concatenate([part.response for part in parts]),
+        position=concatenate_if_all([part.position for part in parts]),
+        excitation=concatenate_if_all([part.excitation for part in parts]),
+        condition=concatenate_if_all([part.condition for part in parts]),
         hold=first.hold,
         segments=tuple(segments),
         meta=meta,
@@ -47,12 +47,13 @@ def _shift_segment(segment: Segment, by: int) -> Segment:
     return replace(segment, start=segment.start + by, stop=segment.stop + by)
 
 
-def _concatenate_if_all(signals: Sequence[Signal | None]) -> Signal | None:
+def concatenate_if_all(signals: Sequence[Signal | None]) -> Signal | None:
+    """The signals end to end; None where one of them is missing."""
     present = [signal for signal in signals if signal is not None]
-    return _concatenate(present) if len(present) == len(signals) else None
+    return concatenate(present) if len(present) == len(signals) else None
 
 
-def _concatenate(signals: Sequence[Signal]) -> Signal:
+def concatenate(signals: Sequence[Signal]) -> Signal:
     first = signals[0]
     if any((s.channels, s.unit) != (first.channels, first.unit) for s in signals):
         raise ValueError(f"not all parts have the channels {', '.join(first.channels)} in {first.unit}")

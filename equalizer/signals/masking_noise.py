@@ -13,6 +13,7 @@ HEADROOM_DB = 3.0
 """Headroom of the highest sample below full scale, for converters that overshoot between samples."""
 
 FULL_SCALE = 2**15 - 1
+"""Largest value of a 16 bit sample."""
 
 
 def masking_noise(

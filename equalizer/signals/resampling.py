@@ -25,8 +25,11 @@ ON_A_SAMPLE = 1e-5
 """Closer than this share of a sample to one, band-limited values are those of the samples: at four fifths of Nyquist
 the error is that of the filter."""
 _HALF_LENGTH = 48
+"""Half the length of the low-pass, in periods of the lower rate."""
 _BETA = 8.6
+"""Shape of the Kaiser window: about 90 dB of attenuation."""
 _UPSAMPLED = 8
+"""Factor of the dense grid between whose samples values are interpolated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +68,7 @@ def resample(samples: Samples, grid: Grid, method: Method) -> FloatArray:
         )
     good = np.isfinite(samples.values)
     if good.sum() < 2:
-        raise ValueError("all samples but one are missing")
+        raise ValueError("all samples but one are missing; two are the least")
     if method == "held":
         index = np.searchsorted(samples.times_s, times_s + near, side="right") - 1
         found: FloatArray = samples.values[np.maximum(index, 0)].copy()

@@ -1,6 +1,7 @@
 """Spectral density by Welch's method: averaged windowed segments (Welch 1967, IEEE Trans. Audio Electroacoust. 15:70).
 
-As `welch` and `csd` of SciPy at their defaults, whose package takes longer to import than many a spectrum.
+The same numbers as `welch` and `csd` of SciPy at their defaults; `scipy.signal` is not used because its import takes
+longer than most spectra.
 """
 
 import numpy as np

@@ -74,7 +74,7 @@ _PEAK = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.IGNOR
 
 
 def respell(text: str, known: Collection[str]) -> str:
-    """In the spelling of this project; `known` are its symbols, which stay as they are."""
+    """Spell a unit as this project does; `known` are its symbols, which stay as they are."""
     plain = text.strip()
     if match := _PEAK.fullmatch(plain):
         return match["unit"]
@@ -104,7 +104,8 @@ def _in_ascii(text: str) -> str:
 
 
 def _respell_symbol(word: str, known: Collection[str]) -> str:
-    """Of two letters the case tells units apart (`mS`, `MM`)."""
+    """Spell a unit's symbol as it is known. In words of two letters the case is kept, because it tells units apart
+    (`mS`, `MM`)."""
     return word if word in known else _SPELLED.get(word.lower() if len(word) > 2 else word, word)
 
 

@@ -15,9 +15,9 @@ FORCES = ("N", "N m")
 @dataclass(frozen=True, slots=True)
 class UnitSystem:
     force: str = "N"
-    """Of a command,"""
+    """Unit of a command; ASCII."""
     length: str = "m"
-    """and of a motion's position; ASCII, "1" for a plain number."""
+    """Unit of a motion's position; ASCII, "1" for a plain number."""
     time: str = "s"
     """"sample" where no time is known."""
 
@@ -57,7 +57,7 @@ class UnitSystem:
 
     @property
     def rotational(self) -> bool | None:
-        """None for a system that is none of SI."""
+        """Whether the system is rotational; None for a system outside SI."""
         return {LINEAR: False, ROTATIONAL: True}.get(self)
 
 

@@ -13,7 +13,7 @@ class UnknownUnitError(ValueError):
 
 
 class _NotAUnitError(UnknownUnitError):
-    """Of the text and why; the suggestion takes long, and is made only where the error is shown."""
+    """Created with the text and the reason; the suggestion takes long, and is made only where the error is shown."""
 
     def __str__(self) -> str:
         text, why = self.args
@@ -53,6 +53,7 @@ _PREFIXABLE: dict[str, Dimension] = {
 _FORCE, _LENGTH = _PREFIXABLE["N"], _PREFIXABLE["m"]
 _TORQUE: Dimension = (1, 2, -2, 0, 0, 0)
 _POUND, _INCH = 0.45359237, 0.0254
+"""Kilograms in a pound, metres in an inch (exact by definition)."""
 _POUND_FORCE = _POUND * 9.80665
 _FIXED: dict[str, Unit] = {
     "1": Unit("1", 1.0, (0, 0, 0, 0, 0, 0)),
@@ -235,8 +236,8 @@ def suggest_unit(text: str) -> str:
 
 
 def plain_unit(text: str) -> str:
-    """As it is written here (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`), where that is a unit; else the text
-    itself."""
+    """Spell a unit as this project does (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`); text that is no unit is
+    returned unchanged."""
     if len(text) > LONGEST_UNIT:
         return text
     # Here, for only files of others spell units in other ways.

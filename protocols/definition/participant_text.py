@@ -12,6 +12,7 @@ from protocols.definition.staircase_rule import STRICT
 Sentence = Annotated[str, Field(min_length=1, max_length=500)]
 Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 LONGEST_SCALE = 11
+"""Most steps of a rating scale."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -76,7 +77,7 @@ class Question:
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """Of the scale; empty where there is none."""
+        """Texts of the scale's steps; empty where there is no scale."""
         return tuple(str(step) for step in range(self.scale[0], self.scale[1] + 1)) if self.scale else ()
 
     @property

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from protocols.definition.study_protocol import StudyProtocol
 
 ROUNDING_N = 1e-9
+"""Tolerance for rounding when forces are compared."""
 
 
 def contradictions(protocol: StudyProtocol) -> list[Problem]:

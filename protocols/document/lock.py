@@ -10,6 +10,7 @@ from protocols.document.hashing import protocol_hash
 
 FORMAT = "hapteq-protocol-lock"
 VERSION = 1
+"""Version of the lock's format."""
 
 
 class LockError(ValueError):
@@ -38,7 +39,9 @@ def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, 
     locked: time of the lock in words, for the message.
     """
     if protocol.name != lock.name:
-        raise LockError(f"the lock is that of protocol {lock.name}, not of {protocol.name}")
+        raise LockError(
+            f"the lock is that of protocol {lock.name}, not of {protocol.name}; give the lock of this protocol"
+        )
     now = protocol_hash(protocol)
     if now != lock.hash:
         raise LockError(

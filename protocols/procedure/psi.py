@@ -22,7 +22,7 @@ LEVEL_STEP_DB, LOWEST_DB = 1.0, -34.0
 BEYOND_DB = 12.0
 """Thresholds of the grid end this far above the cap and below the lowest level."""
 SLOPES = tuple(float(slope) for slope in np.geomspace(0.8, 5.0, 7))
-"""Of a Weibull curve over newtons; equally probable. Usual people have 2."""
+"""Slopes of the Weibull curve over newtons, equally probable a priori. Most people have about 2."""
 LAPSE = 0.02
 """Share of inattentive answers, half of them wrong, as in the other analyses: without it a single lapse at a high level
 could never be undone."""
@@ -37,7 +37,7 @@ Answered = tuple[float, bool]
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """Of the threshold, in dB re 1 N."""
+    """Estimate of the threshold, in dB re 1 N."""
 
     mean_db: float
     sd_db: float

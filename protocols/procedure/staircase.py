@@ -40,9 +40,9 @@ class StaircaseState:
     """Number of times the rule asked for a level above the cap."""
     reversals_at_cap: int = 0
     answered: tuple[Answered, ...] = ()
-    """Of a run whose levels Psi chooses: all its answers. None otherwise."""
+    """All answers of a run whose levels are chosen by Psi; empty for other rules."""
     spread_db: float = math.inf
-    """Of such a run: standard deviation of the threshold's posterior."""
+    """Standard deviation of the threshold's posterior, for a run whose levels are chosen by Psi."""
 
     @property
     def reversals(self) -> int:

@@ -39,33 +39,33 @@ def in_language(values: Mapping[str, Any], table: Mapping[str, str], name: str) 
     protocols are replaced where they stand; a lab's own stay as they are written. name: of the language."""
     sentences = {PROTOCOLS[key]: table[key] for key in PROTOCOLS if key in table}
 
-    def said(text: Any) -> Any:
+    def translate(text: Any) -> Any:
         return sentences.get(text, text) if isinstance(text, str) else text
 
     resolved = {**values, "text": {"language": name, "words": {**table, **own_words(values)}}}
-    resolved["title"] = said(values.get("title"))
+    resolved["title"] = translate(values.get("title"))
     for kind, key in (("consent", "statements"), ("consent", "exclusions"), ("setup", "grip")):
         if isinstance(values.get(kind), dict) and key in values[kind]:
-            resolved[kind] = {**resolved[kind], key: _each(values[kind][key], said)}
+            resolved[kind] = {**resolved[kind], key: _each(values[kind][key], translate)}
     for kind in ("before", "debrief"):
         if isinstance(values.get(kind), list):
-            resolved[kind] = [_question(question, said) for question in values[kind]]
+            resolved[kind] = [_question(question, translate) for question in values[kind]]
     return {key: value for key, value in resolved.items() if value is not None}
 
 
-def _question(question: Any, said: Callable[[Any], Any]) -> Any:
+def _question(question: Any, translate: Callable[[Any], Any]) -> Any:
     """What is logged of a choice does not change with the language."""
     if not isinstance(question, dict):
         return question
-    asked = {key: _each(value, said) if key in ("question", "choices", "ends") else value
+    asked = {key: _each(value, translate) if key in ("question", "choices", "ends") else value
              for key, value in question.items()}  # fmt: skip
     if question.get("choices") and not question.get("codes") and asked["choices"] != question["choices"]:
         asked["codes"] = question["choices"]
     return asked
 
 
-def _each(value: Any, said: Callable[[Any], Any]) -> Any:
-    return [said(each) for each in value] if isinstance(value, list) else said(value)
+def _each(value: Any, translate: Callable[[Any], Any]) -> Any:
+    return [translate(each) for each in value] if isinstance(value, list) else translate(value)
 
 
 def _problem(key: str, text: Any) -> Problem | None:
@@ -87,5 +87,5 @@ def _short(text: str) -> str:
 
 
 def known_languages() -> str:
-    """In words, for a message."""
+    """The known languages in words, for a message."""
     return ", ".join(f'"{code}" ({name})' for code, name in LANGUAGES.items())

@@ -1,4 +1,4 @@
-"""What is shown: a protocol's own texts, and the English ones where it has none."""
+"""Lookup of every text that is shown: a protocol's own texts, and the English ones where it has none."""
 
 import re
 from collections.abc import Mapping
@@ -9,34 +9,29 @@ from protocols.wording.english_facts import FACTS
 from protocols.wording.english_screens import SCREENS
 
 KEYS = {text: key for key, text in SCREENS.items() if key.startswith("key_")}
-"""Key of a footer's word by its English."""
+"""Key of a footer's word, by its English text."""
 
 
 def _pattern(text: str) -> re.Pattern[str]:
-    """What a fact looks like when its braces are filled in."""
-    parts = re.split(r"\{(\w+)\}", text)
-    return re.compile(
-        "".join(
-            f"(?P<{part}>.+?)" if odd else re.escape(part) for part, odd in zip(parts, _alternating(), strict=False)
-        ),
-        re.DOTALL,
-    )
-
-
-def _alternating() -> list[bool]:
-    return [False, True] * 20
+    """Pattern of a fact with its braces filled in: each brace becomes a group of its name."""
+    parts = re.split(r"\{(\w+)\}", text)  # plain text and names of braces in turn
+    groups = (f"(?P<{part}>.+?)" if place % 2 else re.escape(part) for place, part in enumerate(parts))
+    return re.compile("".join(groups), re.DOTALL)
 
 
 PATTERNS = {
     key: _pattern(text) for key, text in sorted(FACTS.items(), key=lambda fact: ("{" in fact[1], -len(fact[1])))
 }
-"""Exact sentences first, then the longest."""
+"""Patterns of all facts in the order in which they are tried: exact sentences first, then the longest, so that a short
+pattern does not match a part of a longer sentence."""
 
 
 @dataclass(frozen=True, slots=True)
 class Words:
+    """The texts of one protocol in one language."""
+
     own: Mapping[str, str] = field(default_factory=dict, hash=False)
-    """By key. A key that is missing has its English text."""
+    """A protocol's own texts by key. A key that is missing has its English text."""
 
     def __getitem__(self, key: str) -> str:
         return self.own.get(key) or ENGLISH[key]
@@ -48,7 +43,7 @@ class Words:
         return (self[key] if fitting else ENGLISH[key]).format_map(values)
 
     def counted(self, key: str, count: int) -> str:
-        """The text for one, or for another count."""
+        """The text in the singular for a count of 1, else in the plural."""
         return self[f"{key}_1"] if count == 1 else self.fill(f"{key}_n", {"count": count})
 
     def key(self, english: str) -> str:

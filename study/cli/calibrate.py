@@ -34,7 +34,7 @@ def calibrate(
     plan = CalibrationPlan(out, device, radius, depth)
     with late_bar("Calibration (%)", total=100) as show:
         written = calibrate_linkage(plan, lambda share: show(round(100 * share)))
-    told = json.dumps(calibration_summary(written), indent=2)
-    typer.echo(told if as_json else "\n".join((str(out), *calibration_lines(written))))
+    summary = json.dumps(calibration_summary(written), indent=2)
+    typer.echo(summary if as_json else "\n".join((str(out), *calibration_lines(written))))
     for warning in written.warnings:
         typer.echo(f"Note: {warning}", err=True)

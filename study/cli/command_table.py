@@ -39,7 +39,7 @@ COMMANDS: dict[str, dict[str, str]] = {
     },
     "Device": {
         "doctor": "Check installation, device, sensor and 1 kHz timing",
-        "calibrate": "Read inertia and Jacobian over the workspace; nothing moves",
+        "calibrate": "Read inertia and Jacobian over the workspace, at rest",
         "record": "Record the device's answer to an excitation",
         "identify": "Fit a stable state-space model to a band, and test it",
         "equalize": "Turn wanted accelerations into forces",
@@ -60,7 +60,7 @@ COMMANDS: dict[str, dict[str, str]] = {
         "kit": "Take a blind test on your own device",
     },
 }
-"""By group: what each command does."""
+"""What each command does, by group."""
 
 
 class LoadedWhenCalled(Mapping[str, Any]):

@@ -110,8 +110,8 @@ def _accept(device: str, examination: "Examination", operator: str, hands_off: b
     from study.workflows.checks.examine_setup import accept
 
     with _moving(hands_off) as moving:
-        said = accept(device, examination, operator, moving)
-    typer.echo(said, err=True)
+        sentence = accept(device, examination, operator, moving)
+    typer.echo(sentence, err=True)
 
 
 def _check_today(device: str, examination: "Examination", as_json: bool, hands_off: bool) -> None:

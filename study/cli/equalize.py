@@ -54,7 +54,7 @@ def equalize(
     from study.workflows.equalizer.equalize_trajectory import EqualizePlan
     from study.workflows.equalizer.repeat_trajectory import RepeatOrder
 
-    _require_whole(files, repeat, device, earlier)
+    _check_arguments(files, repeat, device, earlier)
     *models, trajectory = files
     plan = EqualizePlan(tuple(models), trajectory, out, at, weight, cap, constrain, physics)
     found, lines = (
@@ -65,20 +65,20 @@ def equalize(
     typer.echo(json.dumps(found, indent=2) if as_json else "\n".join((str(out), *lines)))
 
 
-def _require_whole(files: list[Path], repeat: int | None, device: str | None, earlier: Path | None) -> None:
+def _check_arguments(files: list[Path], repeat: int | None, device: str | None, earlier: Path | None) -> None:
     from study.errors import WrongUseError
 
     if len(files) < 2 or files[-1].suffix.lower() in (".h5", ".hdf5"):
         raise WrongUseError(
-            "What shall be equalized?",
-            "Models are needed and, behind them, a table of wanted accelerations.",
-            "Such as: hapteq equalize model.h5 wanted.csv --out forces.csv",
+            "Models or the table are missing",
+            "hapteq equalize takes one or more models and, last, a table of wanted accelerations.",
+            "Give them in this order, such as: hapteq equalize model.h5 wanted.csv --out forces.csv",
         )
     if (repeat is None) != (device is None) or (earlier is not None and repeat is None):
         raise WrongUseError(
-            "Repeating needs to know how often, and on what",
+            "--repeat and --device need each other",
             "--repeat and --device go together, and --from only with them.",
-            "Such as: hapteq equalize model.h5 wanted.csv --repeat 10 --device simulated --out forces.csv",
+            "Give both, such as: hapteq equalize model.h5 wanted.csv --repeat 10 --device simulated --out forces.csv",
         )
 
 

@@ -40,6 +40,6 @@ def export(
     if as_json:
         typer.echo(json.dumps({"out": str(done.out), "files": done.files, "trials": done.trials}, indent=2))
         return
-    for said in done.left_out:
-        typer.echo(f"Left out: {said}", err=True)
+    for remark in done.left_out:
+        typer.echo(f"Left out: {remark}", err=True)
     typer.echo(f"{done.out}: {done.trials} trials in {len(done.files)} files")

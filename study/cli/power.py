@@ -174,9 +174,14 @@ def _with_habits(crowd: "Crowd", people: str, curve: str, lapse: float, repeats:
         "repeating": replace(crowd, unsure=0.5, repeats=repeats),
         "criterion-drift": replace(crowd, criterion_drift_sd=0.3),
     }
-    for said, name, known in (("--people", people, list(habits)), ("--curve", curve, [each.value for each in Family])):
+    for option, name, known in (
+        ("--people", people, list(habits)),
+        ("--curve", curve, [each.value for each in Family]),
+    ):
         if name not in known:
-            raise WrongUseError("There are no such people", f"{said} is {name}.", f"Choose one of {', '.join(known)}.")
+            raise WrongUseError(
+                "There are no such people", f"{option} is {name}.", f"Choose one of {', '.join(known)}."
+            )
     return replace(habits[people], family=Family(curve), lapse=lapse)
 
 

@@ -45,7 +45,7 @@ def bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
-    """As `bar`, but drawn only at the first progress, because something may have to be read or asked first."""
+    """Progress bar that is drawn only at the first progress, because something may have to be read or asked first."""
     with ExitStack() as stack:
 
         @cache

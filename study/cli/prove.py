@@ -51,7 +51,7 @@ def prove(
         if laws:
             _prove_laws(out, plan, options, table, as_json)
             return
-        proof = _with_steps(lambda said: proved(out, plan, options, said))
+        proof = _with_steps(lambda on_step: proved(out, plan, options, on_step))
     write_proof(proof)
     if table is not None:
         write_table(table, proof)
@@ -62,7 +62,7 @@ def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path
     from study.evaluation.bank.laws.prove_laws import prove_laws
     from study.evaluation.bank.laws.write_laws import law_lines, law_summary, write_law_table, write_laws
 
-    proof = _with_steps(lambda said: prove_laws(out, plan, options, said))
+    proof = _with_steps(lambda on_step: prove_laws(out, plan, options, on_step))
     write_laws(proof)
     if table is not None:
         write_law_table(table, proof)

@@ -18,7 +18,8 @@ SchedulerOption = Annotated[
 
 @contextmanager
 def cluster_if(scheduler: str | None) -> Iterator[Executor | None]:
-    """None without a scheduler. Raises StudyError where the cluster cannot be used."""
+    """Connect to the scheduler's cluster; None without a scheduler. Raises StudyError where the cluster cannot be
+    used."""
     if scheduler is None:
         yield None
         return

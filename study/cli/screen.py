@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from study.errors import DeviceError, ExitCode, LeftError, StudyError, WrongUseError
+from study.errors import DeviceError, ExitCode, StudyError, UserInterruptError, WrongUseError
 
 if TYPE_CHECKING:
     from study.tui.app.app_start import AppStart
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 KINDS: dict[int, type[StudyError]] = {
     ExitCode.WRONG_USE: WrongUseError,
     ExitCode.DEVICE: DeviceError,
-    ExitCode.INTERRUPTED: LeftError,
+    ExitCode.INTERRUPTED: UserInterruptError,
 }
 
 

@@ -67,7 +67,7 @@ def _show_recording(path: Path, as_json: bool) -> None:
 
 
 def _folder(what: str, data: Path) -> Path:
-    """Also that of a session that was withdrawn or cannot be read: these are looked at too."""
+    """Folder of a session, also of one that was withdrawn or cannot be read: these can be shown too."""
     from study.store.sessions.archive import find_session, session_folders
 
     folder = Path(what) if Path(what).is_dir() else data / what
@@ -111,12 +111,12 @@ def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
     width = columns()
     inside = None if width is None else width - 2
     yield view.verdict
-    said = (
+    sections = (
         ("Effects", view.sentences),
         ("Candidates, not confirmed", view.candidates),
         ("Rivals, and why not", view.rivals),
     )
-    for title, sentences in said:
+    for title, sentences in sections:
         if sentences:
             yield from ("", title, *(f"  {sentence}" for sentence in sentences))
     for title, rows in (("Fit", view.fit), ("Mismatch", view.mismatch), ("What remains", view.remainder)):

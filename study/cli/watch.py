@@ -121,8 +121,8 @@ def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], .
 
     session = SessionFolder(folder)
     if stop:
-        said = f"The force is off and the sitting ends. Go on with: hapteq resume {folder}"
-        _ask_for(session, StopAsked("experimenter"), said)
+        sentence = f"The force is off and the sitting ends. Go on with: hapteq resume {folder}"
+        _ask_for(session, StopAsked("experimenter"), sentence)
     for text, adverse in notes:
         if text:
             write_note(session, text, adverse)
@@ -130,9 +130,9 @@ def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], .
         _ask_for(session, PauseAsked("experimenter"), "Paused. The participant goes on at their own screen.")
 
 
-def _ask_for(session: "SessionFolder", request: "Request", said: str) -> None:
+def _ask_for(session: "SessionFolder", request: "Request", text: str) -> None:
     from study.devices.clock import RealClock
     from study.workflows.views.send_request import send_request
 
     send_request(session, request, RealClock())
-    typer.echo(said, err=True)
+    typer.echo(text, err=True)

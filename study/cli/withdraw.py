@@ -24,7 +24,7 @@ def withdraw(
     folder = session_to_withdraw(session, data)
     place = folder.path.parent
     plan = plan_withdrawal(folder)
-    made = ", ".join(str(place / name) for name in plan.made_from_them)
+    made = ", ".join(str(place / name) for name in plan.derived_roots)
     analysis = f", and the analysis in {made}" if made else ""
     typer.echo(f"To be erased for good: {', '.join(plan.sessions)}{analysis}", err=True)
     for sentence in plan.doubtful:

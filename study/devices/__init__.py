@@ -1,4 +1,4 @@
-"""Devices behind one safety layer.
+"""Devices behind a common safety layer.
 
 `opening.open_device` is the only door; an import contract keeps it so. It finds a driver by name (`rigs_by_name`),
 asks for `admission`, and puts the device behind `safe`. `device` is the port that a study sees, `rig` the one that a

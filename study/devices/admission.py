@@ -1,4 +1,4 @@
-"""What the safety layer refuses before anything moves, each with a sentence that says why."""
+"""Requests that the safety layer refuses before anything moves, each with a sentence that says why."""
 
 import math
 
@@ -119,11 +119,11 @@ def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
 
 def _check_info(info: DeviceInfo) -> None:
     """What the spring, the fades and all times rest on."""
-    told = (
+    ranges = (
         ("sample_rate_hz", info.sample_rate_hz, *RATES_HZ),
         ("effective_mass_kg", info.effective_mass_kg, 1e-3, HEAVIEST_KG),
     )
-    for name, value, least, most in told:
+    for name, value, least, most in ranges:
         if not least <= value <= most:
             raise DeviceError(
                 "The device was not opened: what it says of itself cannot be",

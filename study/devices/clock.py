@@ -1,4 +1,4 @@
-"""The clock port, so that a session of half an hour can be run in a second of tests."""
+"""Clock port: real time, or virtual time in which a session of half an hour runs in a second."""
 
 import time
 from collections.abc import Callable
@@ -62,7 +62,8 @@ class VirtualClock:
 
     @classmethod
     def not_before(cls, utc: str) -> "VirtualClock":
-        """From now on, or from this time where it is later: a simulated session runs ahead of real time."""
+        """The same clock from this time on, or from now where that is later: a simulated session runs ahead of real
+        time."""
         return cls(max(datetime.now(UTC), datetime.fromisoformat(utc)))
 
     def listen(self, listener: Callable[[float], None]) -> None:

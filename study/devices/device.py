@@ -1,4 +1,4 @@
-"""The device port: all that the rest of the program may ask of a device.
+"""Device port: the interface through which the rest of the program uses a device.
 
 Every call and every answer is a value: a real device's 1 kHz loop lives in a process of its own (`loop_process`).
 `hold` has no end because a participant feels a trial as long as wanted.

@@ -1,4 +1,4 @@
-"""Masking noise from the computer's own sound output, in a loop without a seam, while a participant sits at the device.
+"""Masking noise from the computer's sound output, in a seamless loop, while a participant sits at the device.
 
 The library (PortAudio by sounddevice) is imported only where a protocol asks for noise, and takes the samples in a
 thread of its own.
@@ -61,7 +61,8 @@ class MaskingSound:
                 raise OSError(f"{self.output} plays no more" if self._playing else f"{self.output} plays nothing")
 
     def stop(self) -> bool:
-        """Without what the output still holds in its buffers. Whether it played until now. Never raises."""
+        """Stop at once, without what the output still holds in its buffers. Returns whether it played until now. Never
+        raises."""
         played, self._playing = self._playing, False
         if played:
             with contextlib.suppress(Exception):

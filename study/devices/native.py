@@ -27,7 +27,7 @@ _intrinsic: Any = intrinsic
 _cgutils: Any = cgutils
 
 _CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
-"""Of Linux."""
+"""Constants of Linux (time.h, errno.h)."""
 
 
 def _caller(result: Any) -> Any:
@@ -88,7 +88,7 @@ def set_word(context: Any, address: Any, place: Any, value: Any) -> Any:
 
 @part
 def now_s(system: Addresses) -> float:
-    """As `time.monotonic`, to the last bit."""
+    """The time in s, as `time.monotonic` gives it, to the last bit."""
     if system[CLOCK] == 0:
         return float(call_float(system[MONOTONIC], ()))
     time_now = room_for_2()
@@ -101,7 +101,7 @@ def now_s(system: Addresses) -> float:
 
 @part
 def sleep_until(system: Addresses, until_s: float) -> None:
-    """Only where `system[SLEEP]` is not 0."""
+    """Sleep until a time. Call it only where `system[SLEEP]` is not 0."""
     until = room_for_2()
     whole_s = int(until_s)
     set_word(until, 0, whole_s)
@@ -154,7 +154,7 @@ _monotonic = ctypes.CFUNCTYPE(ctypes.c_double)(time.monotonic)
 
 
 def address_of(function: Any) -> int:
-    """Of a function of a loaded library."""
+    """Address of a function of a loaded library."""
     return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
 
 

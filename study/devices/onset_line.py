@@ -1,4 +1,4 @@
-"""A pulse on a line at the beginning of each trial's force, for a recorder beside (EEG, EMG, a camera).
+"""Electrical pulse at the onset of each trial's force, for an external recorder (EEG, EMG, a camera).
 
 A byte or a control line of a serial port, or the data lines of a parallel one, behind one small port. A line that hangs
 or is gone costs no trial: the pulse is told as lost, and the next one tries to open the line anew.

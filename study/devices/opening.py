@@ -1,4 +1,4 @@
-"""The one door to a device: every device that comes out of it stands behind the safety layer.
+"""Opens devices: the only access to one, and every device that is opened stands behind the safety layer.
 
 The heavy parts (numba above all) are imported when a device is opened, so that the command line starts at once.
 """
@@ -62,11 +62,12 @@ class LinkageSource(Protocol):
     def info(self) -> DeviceInfo: ...
 
     def at(self, position_m: "FloatArray") -> "LinkageReading | None":
-        """At any position of the handle (3,), wherever it is; None out of reach. Raises `DeviceError`."""
+        """The linkage at a position of the handle (3,), wherever the handle is; None out of reach. Raises
+        `DeviceError`."""
         ...
 
     def angles_at(self, position_m: "FloatArray") -> "FloatArray | None":
-        """As `at`, the joint angles (3,) alone, rad."""
+        """Joint angles (3,) at a position of the handle (3,), rad; None out of reach. Raises `DeviceError`."""
         ...
 
     def check_frame(self) -> None:
@@ -90,11 +91,11 @@ def open_device(
         from study.devices.loop_process.remote_device import open_remotely
 
         return open_remotely(name, settings, seed)
-    from study.devices.rigs_by_name import rig_named
+    from study.devices.rigs_by_name import find_rig
     from study.devices.safe import SafeDevice
     from study.devices.telemetry import Ring
 
-    rig = rig_named(name, settings, seed)
+    rig = find_rig(name, settings, seed)
     ring: Ring | None = None
     try:
         ring = Ring(telemetry) if telemetry or (own_process and not clock.virtual) else None
@@ -217,7 +218,8 @@ def lab_file_path() -> Path:
 
 
 def device_folder() -> Path:
-    """Where this computer keeps what it knows of its device: settings, acceptance, baseline and daily checks."""
+    """Folder in which this computer keeps what it knows of its device: settings, acceptance, baseline and daily
+    checks."""
     return lab_file_path().parent
 
 
@@ -241,12 +243,10 @@ def proof_force_n() -> float:
 def accept_device(
     name: str, settings: DeviceSettings, clock: Clock, operator: str, baseline: tuple[str, str] = ("", "")
 ) -> str:
-    """With no hand on the handle: ask for more than the cap, hold a small force, stop the loop on purpose, and sign
-    that the device got no more than the cap and let go.
-
-    What was written, in a sentence. Raises `DeviceError`. What else is to be fine, the caller has found fine before.
-    baseline: name and SHA-256 of the recording that the daily check is to compare with.
-    """
+    """Accept a device with no hand on the handle: ask for more than the cap, hold a small force, stop the loop on
+    purpose, and sign that the device got no more than the cap and let go. Returns a sentence on what was written.
+    Raises `DeviceError`. The caller has checked everything else before. baseline: name and SHA-256 of the recording
+    that the daily check is to compare with."""
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
     from study.devices.force_dimension.force_proof import ASKED_SHARE, FORCE_N, prove_cap_holds, prove_force_goes
     from study.devices.rigs_by_name import RIGS_BY_NAME

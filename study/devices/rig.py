@@ -78,10 +78,10 @@ class Halves:
     write: Callable[..., Any]
     """write(calls, cells, force_n): force_n, shape (3,). 0, or a code above it."""
     calls: npt.NDArray[np.int64]
-    """Of `study.devices.native.system_calls`, and behind them the driver's own."""
+    """Addresses in `study.devices.native.system_calls`, followed by the driver's own."""
     cells: FloatArray
     samples: FloatArray
-    """Of the accelerometer, shape (rows, columns)."""
+    """Samples of the accelerometer, shape (rows, columns)."""
     error: Callable[[int], Exception]
     """error(code): what the rig's own methods raise; asked for in the thread that got the code."""
 

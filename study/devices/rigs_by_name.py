@@ -1,4 +1,5 @@
-"""The bare devices behind `study.devices.opening`, which alone may ask for one. Heavy: imported when one is opened."""
+"""Drivers by name: builds the bare device for `study.devices.opening`, which alone may ask for one. Heavy to import:
+loaded when a device is opened."""
 
 from collections.abc import Callable
 from functools import partial
@@ -65,7 +66,7 @@ RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
 """Rig of a name, its settings and a seed; the same names as in `study.devices.opening`."""
 
 
-def rig_named(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRig:
+def find_rig(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRig:
     """The rig of a known name, a replay, or a simulation as calibrated. Raises `StudyError`."""
     if name.startswith(REPLAY):
         # Imported here: its compiled code is loaded then.

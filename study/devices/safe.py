@@ -1,4 +1,4 @@
-"""The device behind its safety layer: the `Device` port over any rig, compiled or stepped, in any time.
+"""Safety layer: the `Device` port over any rig, compiled or stepped, in real or virtual time.
 
 What a force may be is decided in `governor.govern`, what is refused beforehand in `admission`, when ticks run in
 `drive.virtual_drive` and `drive.realtime_drive`.
@@ -33,7 +33,7 @@ BLOCK_S = 0.05
 VIRTUAL_BLOCK_S = 5.0
 
 PATIENCE_S = 1.0
-"""Beyond all fades, before a device that does not become still counts as lost."""
+"""Time granted beyond all fades, before a device that does not become still counts as lost."""
 
 
 class SafeDevice:
@@ -78,8 +78,8 @@ class SafeDevice:
         self._held = stimulus
 
     def hold_unchecked(self, stimulus: HeldStimulus) -> None:
-        """As `hold`, for a stimulus that it refuses, of the right shape: to show with no hand on the handle that the
-        caps of each tick hold."""
+        """Hold a stimulus of the right shape that `hold` refuses: shows, with no hand on the handle, that the caps of
+        each tick hold."""
         if self._hand_on_handle:
             raise _refusal("A hand is on the handle.", "Open it without.")
         self._must_be_idle()

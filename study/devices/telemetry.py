@@ -1,4 +1,4 @@
-"""The telemetry ring: what each tick of a device's loop saw and sent, in memory that other programs can read meanwhile.
+"""Telemetry ring: the readings and forces of each tick of a device's loop, in memory that other programs can read.
 
 One writer, the loop (`governor.telemetry_row`), any number of readers. The writer never waits and knows of no reader;
 a reader that comes too late is told how many rows it lost. The ring is a file in memory (Linux: /dev/shm; elsewhere
@@ -46,8 +46,8 @@ class Ring:
                 self._make(rows)
 
     def rows(self, rate_hz: float) -> FloatArray | None:
-        """For the loop, (1 + rows, RING_WIDTH), with every page there before the first tick needs it. None where there
-        is no ring."""
+        """The ring for the loop, (1 + rows, RING_WIDTH), with every page in memory before the first tick needs it. None
+        where there is no ring."""
         if not self.path:
             return None
         try:
@@ -59,7 +59,7 @@ class Ring:
         return rows
 
     def remove(self) -> None:
-        """Who reads it keeps what is in it. Never raises; may be called again."""
+        """Remove the ring's file; a reader keeps what is in it. Never raises; may be called again."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             with contextlib.suppress(OSError):
@@ -146,8 +146,8 @@ class TelemetryReader:
 
 def _whole(rows: FloatArray) -> np.ndarray:
     bits = rows.view(np.int64)
-    seen = bits[:, : cells.RING_CHECK]
-    checks = np.sum((seen ^ (seen >> cells.RING_FOLD)) * cells.RING_FACTORS, axis=1)
+    checked = bits[:, : cells.RING_CHECK]
+    checks = np.sum((checked ^ (checked >> cells.RING_FOLD)) * cells.RING_FACTORS, axis=1)
     whole: np.ndarray = checks == bits[:, cells.RING_CHECK]
     return whole
 

@@ -70,7 +70,7 @@ def build_recording(
     """Read, align, resample and convert. on_progress: share done, 0 to 1. Raises CannotReadError,
     ImportRefusedError."""
     what = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
-    said = ImportNotes()
+    import_notes = ImportNotes()
     try:
         units = _units(wanted)
         planned = part_files(wanted, files)
@@ -79,14 +79,14 @@ def build_recording(
         budget = Budget()
         for number, part in enumerate(planned):
             counter = _Counter(number * steps / len(planned), steps, on_progress)
-            parts.append(_part(wanted, part, said, counter, budget))
+            parts.append(_part(wanted, part, import_notes, counter, budget))
         recording, repeats = find_segments(_concatenate(wanted, parts, units))
     except ImportProblemError as error:
         raise ImportRefusedError(what, str(error)) from error
     if problems := recording_problems(recording):
         raise ImportRefusedError(what, "; ".join(problems))
-    notes = said.sentences([part.label for part in planned])
-    return Built(recording, (*notes, *_said_of_units(wanted), *filter(None, (_odd_rate(recording), repeats))))
+    notes = import_notes.sentences([part.label for part in planned])
+    return Built(recording, (*notes, *_unit_remark(wanted), *filter(None, (_odd_rate(recording), repeats))))
 
 
 class _Counter:
@@ -100,7 +100,7 @@ class _Counter:
         self.on_progress(min(1.0, self.done / self.steps))
 
 
-def _part(wanted: ImportMap, files: PartFiles, said: ImportNotes, counter: _Counter, budget: Budget) -> _Part:
+def _part(wanted: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _Counter, budget: Budget) -> _Part:
     read: dict[Path, Arrays] = {}
     loggers = []
     notes: list[str] = []
@@ -113,7 +113,7 @@ def _part(wanted: ImportMap, files: PartFiles, said: ImportNotes, counter: _Coun
         loggers.append(Logger(clock, names, time_base(clock, names)))
 
     def say(sentence: str) -> None:
-        said.add(files.label, sentence)
+        import_notes.add(files.label, sentence)
 
     for note in dict.fromkeys((*(note for arrays in read.values() for note in arrays.notes), *notes)):
         say(note)
@@ -148,7 +148,7 @@ def _unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
     return _ChannelUnit(unit.si, unit.factor, unit.offset, channel.quantity or quantity_of(unit.si))
 
 
-def _said_of_units(wanted: ImportMap) -> Iterator[str]:
+def _unit_remark(wanted: ImportMap) -> Iterator[str]:
     """Remarks on units that cannot be verified: those of computed channels, and channels without one."""
     for computed in (entry for entry in wanted.computed if entry.role != "helper"):
         yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or UNSTATED}."
@@ -205,16 +205,16 @@ def _signal(role: str, wanted: ImportMap, parts: Sequence[_Part], units: dict[Ke
     names = tuple(channel.name for channel in every if channel.role == role)
     if not names:
         return None
-    told = [units[role, name] for name in names]
+    stated = [units[role, name] for name in names]
     columns = [
         np.concatenate([part.signals.columns[role, name] for part in parts]) * unit.factor + unit.offset
-        for name, unit in zip(names, told, strict=True)
+        for name, unit in zip(names, stated, strict=True)
     ]
     return Signal(
         samples=np.column_stack(columns),
         sample_rate_hz=parts[0].signals.grid.rate_hz,
-        quantity=tuple(unit.quantity for unit in told),
-        unit=tuple(unit.si for unit in told),
+        quantity=tuple(unit.quantity for unit in stated),
+        unit=tuple(unit.si for unit in stated),
         channels=names,
     )
 

@@ -34,11 +34,12 @@ _TIME = re.compile(
 )
 _NUMBER = re.compile(r"\d+")
 _NAMED = 3
+"""Most names that an error lists."""
 
 
-def read_headed(path: Path) -> Arrays:
-    """A map for a file that no map describes. Raises CannotReadError; ImportRefusedError also for an invalid field in a
-    column whose name states a role, a quantity or a time, or where every column has one."""
+def read_without_map(path: Path) -> Arrays:
+    """Read the arrays of a file that no map describes. Raises CannotReadError, and ImportRefusedError for an invalid
+    field in a column whose name states a role, a quantity or a time, or where every column has one."""
     arrays = read_arrays(path, CsvMap())
     faulty = [name for name, array in arrays.by_name.items() if _fault(array)]
     columns = [name_signal(header) for header in arrays.by_name] if faulty else []
@@ -50,8 +51,8 @@ def read_headed(path: Path) -> Arrays:
 
 
 def _fault(array: Array) -> str:
-    said = left_out(array)
-    return said if isinstance(said, FaultyColumn) else ""
+    reason = left_out(array)
+    return reason if isinstance(reason, FaultyColumn) else ""
 
 
 def header_map(arrays: Arrays) -> ImportMap | None:
@@ -80,7 +81,7 @@ def header_map(arrays: Arrays) -> ImportMap | None:
 def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     """Sentences about what was taken from the header, what was left out, and what the names leave open."""
     table, _ = _table(arrays)
-    told = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
+    text = ", ".join(f"{channel.name} as {channel.role}" for channel in wanted.channel)
     parts = ", ".join(f"'{part.prefix.rstrip('/_')}'" for part in wanted.part)
     joined = [f"Put one after another, as parts of one recording: {parts}."] if parts else []
     left_out = [f"Left out: '{name}' {why}." for name, why in surplus_arrays(table).items()]
@@ -94,7 +95,7 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     left_out += [f"Left out: '{name}' is no column." for name in others]
     peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_bracketed(channel.value))]
     joined += [f"Rms or peak values by their unit, kept as they are: {', '.join(peaks)}."] if peaks else []
-    return (f"Taken from the header: {told}.", *joined, *left_out, *_direction_notes(table, wanted))
+    return (f"Taken from the header: {text}.", *joined, *left_out, *_direction_notes(table, wanted))
 
 
 def _bracketed(header: str) -> str:
@@ -104,9 +105,9 @@ def _bracketed(header: str) -> str:
 def _direction_notes(table: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     """A sentence where names leave open whether the force or the motion was commanded."""
     _, rest = _columns(table)
-    told = {channel.value: channel.role for channel in wanted.channel}
-    forces = [told[column.header] for column in rest if column.quantity in ("force", "torque")]
-    more_forces = forces.count("command") > list(told.values()).count("response")
+    roles = {channel.value: channel.role for channel in wanted.channel}
+    forces = [roles[column.header] for column in rest if column.quantity in ("force", "torque")]
+    more_forces = forces.count("command") > list(roles.values()).count("response")
     if not may_be_imposed(rest) and not more_forces:
         return ()
     return (f"{IMPOSED if 'response' in forces else NOT_IMPOSED}.",)
@@ -128,9 +129,9 @@ def _table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
 def header_problems(arrays: Arrays) -> tuple[str, ...]:
     """What the names leave open, one clause each with the column; empty if `header_map` gives a map."""
     if not any(array.dtype.kind in "fiub" and array.ndim for array in arrays.by_name.values()):
-        said = {name: what for name, array in arrays.by_name.items() if (what := left_out(array))}
-        kinds = ", ".join(f"'{name}' is {what}" for name, what in said.items())
-        mends = [mend for name, what in said.items() if (mend := instead(name, what))][:1]
+        reasons = {name: what for name, array in arrays.by_name.items() if (what := left_out(array))}
+        kinds = ", ".join(f"'{name}' is {what}" for name, what in reasons.items())
+        mends = [mend for name, what in reasons.items() if (mend := instead(name, what))][:1]
         return ("; ".join((f"it holds no arrays of numbers{f' ({kinds})' if kinds else ''}", *mends)),)
     table, prefixes = _table(arrays)
     if len({_NUMBER.sub("", prefix) for prefix in prefixes}) > 1:

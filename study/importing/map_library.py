@@ -13,7 +13,7 @@ from study.importing.arrays.arrays import read_arrays
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import names_in
 from study.importing.expressions.namespace import of_file
-from study.importing.header_map import header_map, header_problems, read_headed
+from study.importing.header_map import header_map, header_problems, read_without_map
 from study.importing.map_format.import_map import ImportMap
 from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportProblemError, MapNeededError, suggestion
 from study.importing.map_format.map_files import part_files
@@ -116,7 +116,7 @@ def map_by_header(folder: Path) -> FoundMap:
             f"{none}; nor are they parts of one recording by their names ({shown}{', ...' if data[_SHOWN:] else ''}).",
             "Give the files that belong together, in their order; or a map with --map.",
         )
-    arrays = read_headed(data[0])
+    arrays = read_without_map(data[0])
     wanted = header_map(arrays)
     if wanted is None:
         raise MapNeededError(folder.name, f"{none}; {'; '.join(header_problems(arrays))}", map_skeleton(arrays))

@@ -198,14 +198,14 @@ def _table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
 def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> Iterator[str]:
     """names: of the channel, its value, the array's own."""
     name, value, header = names
-    told = name_signal(header)
+    parsed = name_signal(header)
     yield ""
     yield f"[[channel]]               # {header}: {shape}"
     yield f"role = {json.dumps(role):20s} # command, response, position, excitation, condition, helper"
-    yield f"name = {json.dumps(told.name if name == header else name)}"
+    yield f"name = {json.dumps(parsed.name if name == header else name)}"
     yield f"value = {json.dumps(value)}"
-    why = f"{told.doubt}; " if told.doubt else ""
-    yield f'unit = {json.dumps(told.unit):20s} # {why}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
+    unit, why = parsed.unit, f"{parsed.doubt}; " if parsed.doubt else ""
+    yield f'unit = {json.dumps(unit):20s} # {why}as in the file: "N", "m/s^2", "deg", "in", "V"; empty = not known'
     if clock:
         yield f"clock = {json.dumps(clock)}"
 

@@ -60,8 +60,8 @@ def part_signals(
         columns[channel.role, channel.name] = _on_grid(channel, samples, grid, say)
         step()
     for logger in loggers:
-        for said in filter(None, (logger.base.gaps(), logger.base.wander())):
-            say(said)
+        for remark in filter(None, (logger.base.gaps(), logger.base.wander())):
+            say(remark)
     for computed in wanted.computed:
         # Of several channels with the same name, the first counts.
         named = {name: column for (_, name), column in reversed(columns.items())}

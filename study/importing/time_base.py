@@ -88,8 +88,8 @@ class TimeBase:
         )
 
     def samples(self, values: Value) -> Samples:
-        """Times by the reference clock. Rows skipped by a uniform logger are missing samples, unless the map says that
-        there are no gaps."""
+        """Sample times by the reference clock. Rows skipped by a uniform logger are missing samples, unless the map
+        says that there are no gaps."""
         times_s = self.times_s(len(values)) + self.offset_s
         widest_s = 0.0 if self.places is None else float(np.max(np.diff(self.places))) / self.rate_hz
         if self.places is not None and self.places[-1] > len(self.places) - 1 and widest_s <= self.gap_s:
@@ -252,8 +252,8 @@ def without_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, 
     kept = np.delete(np.arange(len(stamps)), standing)
     arrays = {name: array[kept] if _is_row(array, len(stamps)) else array for name, array in names.arrays.items()}
     count = f"{len(standing)} row{'s' if len(standing) > 1 else ''}"
-    said = f"Clock '{clock.name}': {count} logged twice (the same stamp, the same values) left out."
-    return replace(names, arrays=arrays), said
+    text = f"Clock '{clock.name}': {count} logged twice (the same stamp, the same values) left out."
+    return replace(names, arrays=arrays), text
 
 
 def _repeats(array: Array, rows: npt.NDArray[np.intp]) -> bool:

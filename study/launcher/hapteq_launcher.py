@@ -20,7 +20,7 @@ def home() -> Path | None:
     return None
 
 
-def strangers() -> list[Path]:
+def foreign_packages() -> list[Path]:
     """Modules that would be imported under one of our names without being ours."""
     ours = home()
     found = []
@@ -33,7 +33,7 @@ def strangers() -> list[Path]:
 
 
 def main() -> int:
-    foreign = strangers()
+    foreign = foreign_packages()
     if foreign:
         names = ", ".join(str(path) for path in foreign)
         sys.stderr.write(

@@ -32,7 +32,7 @@ class DeliveredFeeler:
     adaptation_db: float = 1.0
     """Rise of the threshold in a long run."""
     adaptation_trials: float = 20.0
-    """After so many trials of a run, 63 % of it has come."""
+    """Time constant of adaptation, in trials of a run."""
 
     def reply(self, felt: Felt, seed: int) -> Reply:
         """The answer to one presentation."""

@@ -18,7 +18,7 @@ class Felt:
     frequency_hz: float
     level_n: float
     direction_shown: int
-    """Its number on the screen, 1 or 2; in a detection trial, of the interval in which it shook."""
+    """Number of the direction on the screen, 1 or 2; in a detection trial, of the interval in which it shook."""
     trials_before: int
     """Trials answered so far in this session, training included."""
     nominal_n: float | None = None

@@ -35,7 +35,7 @@ and so are delivered_7_seed_1, repeating_7_seed_1 and criterion_drift_7_seed_1, 
 _MEMBER = re.compile(rf"(?P<kind>{'|'.join(KINDS)})_(?P<number>[1-9]\d*)_seed_(?P<seed>\d+)")
 
 
-def observer_named(name: str, seed: int) -> Observer:
+def find_observer(name: str, seed: int) -> Observer:
     """The simulated participant of this name. seed: chooses the person for "person" only. Raises WrongUseError for
     an unknown name."""
     known = name.replace("-", "_")

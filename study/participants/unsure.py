@@ -25,7 +25,7 @@ class UnsureRepeater:
     """Threshold of doubt in standard errors of the averaged evidence: 0.5 asks again in about 30 % of the trials near
     the threshold."""
     looks: int = 5
-    """After so many looks at one trial it is answered anyway."""
+    """Most presentations of one trial; then it is answered in any case."""
 
     def reply(self, felt: Felt, seed: int) -> Reply:
         """The answer on all looks so far, and whether another is asked for."""

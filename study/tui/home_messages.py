@@ -71,7 +71,7 @@ class DiagnoseWanted(Message):
     out: str
     """Folder for the results; empty: a new one near what is diagnosed."""
     clean: tuple[str, ...] = ()
-    """Of the device when it was in order."""
+    """Recordings of the device when it was in order."""
 
 
 @dataclass(eq=False)
@@ -84,7 +84,7 @@ class CalibrateWanted(Message):
 
 @dataclass(eq=False)
 class LaidDown(Message):
-    """It lies as the engine asked."""
+    """The device lies as the engine asked."""
 
     number: int
 

@@ -18,7 +18,7 @@ def align_rows(rows: Rows, columns: int | None = None) -> tuple[str, ...]:
 
 
 def lines_of_rows(rows: Rows, columns: int | None = None) -> Rows:
-    """As `align_rows`, grouped by row."""
+    """Align rows as `align_rows` does, grouped by row."""
     if not rows:
         return ()
     count = max(map(len, rows))

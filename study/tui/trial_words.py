@@ -21,7 +21,7 @@ def heading(question: Question, words: Words = ENGLISH_WORDS) -> str:
 
 
 def run_key(question: Question) -> str:
-    """Of what the kind of run is called."""
+    """Key of the text that names the kind of run."""
     if question.practice:
         return "run_practice"
     if question.task is Task.INTERVAL:

@@ -64,7 +64,8 @@ class ScreenServer(Server):
             self._seat.release()
 
     async def handle_download(self, request: web.Request) -> web.StreamResponse:
-        """To the first who asks: two would share its pieces between them, and neither would have the whole."""
+        """Send the file to the first who asks: two would share its pieces between them, and neither would have the
+        whole."""
         key = request.match_info["key"]
         if request.method != "GET" or key in self._being_taken:
             raise web.HTTPConflict(text="This report is sent once, and to one window.")
@@ -86,7 +87,8 @@ class ScreenServer(Server):
     async def _require_token(
         self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
-        """Also for unknown addresses, so that nothing can be distinguished without the token."""
+        """Refuse a request without the token, also for unknown addresses, so that nothing can be distinguished without
+        it."""
         given = request.path.split("/")[1]
         if given == "download" and await self._is_offered(request.path.rpartition("/")[2]):
             return await handler(request)

@@ -52,7 +52,7 @@ def cores() -> int:
 
 
 def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: int | None = None) -> list[Result]:
-    """As `map`, in the same order. Exceptions are raised here; no process is left behind."""
+    """Parallel `map` in forked processes, in the same order. Exceptions are raised here; no process is left behind."""
     pieces = list(zip(*items, strict=True))
     count = min(len(pieces), workers or cores())
     key = _key(function)

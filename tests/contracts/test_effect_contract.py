@@ -171,7 +171,7 @@ def test_more_forces_than_can_be_played_are_refused(bench):
     names = ("coulomb_friction", "quadratic_damping", "hardening_stiffness", "asymmetric_stiffness", "constant_force",
              "cogging", "end_stop")  # fmt: skip
     many = tuple(each for name in names for each in bench.example(name, model))
-    with pytest.raises(ValueError, match="7 different forces act at once; at most 6 can be played"):
+    with pytest.raises(ValueError, match="7 different force laws act at once; simulate at most 6"):
         simulate_mechanism(model, np.zeros((9, 1)), 1000.0, many)
 
 

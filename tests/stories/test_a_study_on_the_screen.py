@@ -9,7 +9,7 @@ import pytest
 
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.session.views.views import Answered
 from study.store.sessions.archive import SessionFolder
 from study.workflows.results.fold_session import fold_session
@@ -89,7 +89,7 @@ class SaysTheSame(SimulatedDisplay):
     direction, so the same key would not be the same answer."""
 
     def __init__(self, given: list[bool], clock: VirtualClock) -> None:
-        super().__init__(observer_named("ideal", SEED), SEED, clock)
+        super().__init__(find_observer("ideal", SEED), SEED, clock)
         self._given = iter(given)
 
     def ask(self, question, sign_of_life):

@@ -47,6 +47,7 @@ from analysis.diagnosis.types import Mapper, TimeBudget
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 ROUNDS = 8
+"""Most passes of the coordinate search over a law's nonlinear parameters."""
 NEEDLESS = "a law of the command leaves as little without it"
 CURVED = "quadratic_damping"
 """Law of the motion that resembles an actuator's curve when the speed follows the command."""

@@ -60,7 +60,8 @@ def look_again(
 
 
 def motions_in_own_band(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
-    """In the band in which the device moves; empty where it is hardly narrower. Raises NoMotionError."""
+    """Filter the motions to the band in which the device moves; empty where that band is hardly narrower. Raises
+    NoMotionError."""
     narrow_hz = motion_band_hz(motions)
     return motions_of(records, narrow_hz) if narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz else ()
 

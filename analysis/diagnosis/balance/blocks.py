@@ -85,7 +85,7 @@ def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float
 
 
 def solve_without_columns(gram: FloatArray, pull: FloatArray, fixed: Mask) -> FloatArray:
-    """As `solve_normal_equations`, with the weights of `fixed` columns held at zero."""
+    """Solve the normal equations as `solve_normal_equations` does, with the weights of `fixed` columns held at zero."""
     free = np.flatnonzero(~fixed)
     found = np.zeros_like(pull)
     found[..., free] = solve_normal_equations((gram[..., free[:, None], free], pull[..., free]), RIDGE)
@@ -93,7 +93,7 @@ def solve_without_columns(gram: FloatArray, pull: FloatArray, fixed: Mask) -> Fl
 
 
 def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
-    """As `solve_normal_equations`, with the ridge on those columns only that are not `free`."""
+    """Solve the normal equations by ridge regression: the ridge acts on the columns that are not `free`."""
     gram, pull = products
     size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
     return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge)) * size, pull[..., None])[..., 0])

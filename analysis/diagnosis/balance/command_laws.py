@@ -49,7 +49,7 @@ class CommandLaw:
     rich: bool = False
     """Whether it has more freedom than the plain laws, and counts only with a clearly smaller error."""
     scale: float = 1.0
-    """Of a single column: scale that makes it a force."""
+    """Scale that converts a single column to a force."""
     formula: Callable[[dict[str, float], float], Formula] | None = None
     """From values and scale: formula that a simulation uses for the command, where the catalogue has no such effect."""
 

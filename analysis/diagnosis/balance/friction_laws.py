@@ -95,7 +95,8 @@ def _drifting_columns(c: int, sharp: float) -> Columns:
 
 
 def _drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-    """None where the friction would be negative somewhere in the part: it would drive the motion."""
+    """Parameters of a drifting friction; None where it would be negative somewhere in the part: it would drive the
+    motion."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > abs(w[1]) else None
 
 

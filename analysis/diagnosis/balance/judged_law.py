@@ -22,7 +22,7 @@ class JudgedLaw:
     """A law with its parameters, its gain, and the reason where it is not named."""
 
     place: int
-    """Its number in the regression."""
+    """Index of the law in the regression."""
     law: Law
     values: dict[str, float]
     gain: float
@@ -30,7 +30,7 @@ class JudgedLaw:
     gain_low: float
     """Lower confidence bound of the gain, at 97.5 %."""
     share: float
-    """Its share of the gain of all laws together."""
+    """The law's share of the gain of all laws together."""
     alike: tuple[str, ...]
     """Effects that fit as well in its place (class)."""
     probability: float

@@ -42,7 +42,8 @@ def search_beside_linear(
     without: frozenset[str],
     time_left: TimeBudget,
 ) -> StructureSearch:
-    """As `search_structures`, repeated beside the delay and the linear laws that the first search finds."""
+    """Search structures with `search_structures`, again beside the delay and the linear laws that the first search
+    finds."""
     beside = BaseTerms(driven_motion(motions)[axis])
     found = search_structures(motions, axis, rotational, without, time_left, beside)
     for _ in range(LINEAR_PART_ROUNDS - 1):

@@ -34,8 +34,8 @@ class GivenBase:
 
 
 def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
-    """As `regression_of`, with the model's needed force as the base. Free parameters that hardly change the force are
-    left out."""
+    """Build the regression of `regression_of` with the model's required force as its base. Free parameters that hardly
+    change the force are left out."""
     varying = _sensitive_columns(given)
     columns = [each[:, varying] for each in given.columns]
     plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)
@@ -49,7 +49,7 @@ def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence
 
 
 def takes_enough(plain: Regression, least: float) -> bool:
-    """Whether all laws together take so much of the force, over the folds."""
+    """Whether all laws together explain at least this share of the force, in the mean over the folds."""
     alone = float(plain.cross_validated_errors(plain.columns_of(())).sum())
     whole = fit_all_laws(plain, range(plain.columns[0].shape[1]))[0]
     return alone - whole > least**2 * sum(block.signal for block in plain.fit)
@@ -65,8 +65,8 @@ def _power_per_freedom(plain: Regression) -> float:
     left = plain.remainder(plain.columns_of(()))
     power, freedom = 0.0, 0.0
     for residual, motion in zip(left, plain.motions, strict=True):
-        seen = np.where(motion.valid_samples(motion.fit), residual, 0.0)
-        lines = np.abs(np.fft.rfft(seen)) ** 2
-        power += float(seen @ seen)
+        known_residual = np.where(motion.valid_samples(motion.fit), residual, 0.0)
+        lines = np.abs(np.fft.rfft(known_residual)) ** 2
+        power += float(known_residual @ known_residual)
         freedom += 2 * float(lines.sum()) ** 2 / max(float((lines**2).sum()), 1e-300)
     return power / max(freedom, 1.0)

@@ -186,7 +186,7 @@ def _band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> Fl
 def _motion_without_clock(
     record: Observed, samples: FloatArray, condition: FloatArray, names: tuple[str, ...]
 ) -> Motion:
-    """Without a time axis: positions, and the sign of their change from sample to sample."""
+    """Motion of a recording without a time axis: positions, and the sign of their change from sample to sample."""
     return Motion(
         record.recording.sample_rate_hz, np.inf, 1, names, 0, samples, np.gradient(samples, axis=0),
         np.zeros_like(samples), fill_gaps(record.command), condition, record.fit | record.choose, record.test,

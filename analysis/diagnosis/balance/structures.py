@@ -18,6 +18,7 @@ from equalizer.signals.signal import FloatArray
 REFINED = (0.8, 0.93, 1.075, 1.25)
 """Factors on a nonlinear parameter in a coordinate search."""
 ROUNDS = 6
+"""Most passes of the search over the nonlinear parameters of a sum's laws."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

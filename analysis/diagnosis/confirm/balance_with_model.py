@@ -49,14 +49,14 @@ def find_balances_beside_model(
         found = motions_of(records)
         if len(found[0].channels) < model.inputs or found[0].order == 2 or not np.isfinite(found[0].band_hz):
             return ()
-        seen = [_balance_data(record, motion, model) for record, motion in zip(records, found, strict=True)]
+        data = [_balance_data(record, motion, model) for record, motion in zip(records, found, strict=True)]
         axes = driven_axes(model)
         mass = np.einsum("nm,nk,km->m", axes, model.mass, axes)
         return tuple(
             judge_laws(
                 search_structures(
-                    [_select_axis(each.motion, axis) for each in seen], axis, model.rotational, without, time_left,
-                    GivenBase(tuple(each.columns[axis] for each in seen), float(mass[axis]), LAW_OF_SIGNAL),
+                    [_select_axis(each.motion, axis) for each in data], axis, model.rotational, without, time_left,
+                    GivenBase(tuple(each.columns[axis] for each in data), float(mass[axis]), LAW_OF_SIGNAL),
                 )
             )
             for axis in range(model.inputs)
@@ -67,8 +67,8 @@ def find_balances_beside_model(
 
 def _select_axis(motion: Motion, axis: int) -> Motion:
     """The motion of one axis alone: the catalogue has no laws of another axis's motion."""
-    courses = {name: getattr(motion, name)[:, [axis]] for name in ("position", "velocity", "acceleration")}
-    return replace(motion, channels=motion.channels[axis : axis + 1], **courses)
+    selected = {name: getattr(motion, name)[:, [axis]] for name in ("position", "velocity", "acceleration")}
+    return replace(motion, channels=motion.channels[axis : axis + 1], **selected)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,11 +84,11 @@ def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _
     known = under_conditions(place_recorded_effects(model, recording), recording)
     at = _structure(add_carried_weight(model, recording), known)
     whole = required_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
-    course = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
+    motion_of_axis = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
     entered = actuator_force(model, motion.force, rate_hz, known, recording.hold)
-    added = force_along(at, known, course, (motion.force, entered - whole.force), rate_hz)
+    added = force_along(at, known, motion_of_axis, (motion.force, entered - whole.force), rate_hz)
     every = max(int(rate_hz / (FINEST * motion.band_hz)), 1)
-    position, velocity, acceleration = (each[::every] for each in course)
+    position, velocity, acceleration = (each[::every] for each in motion_of_axis)
     thin = replace(
         motion, rate_hz=rate_hz / every, step=max(int(rate_hz / every / (MOTION_OVERSAMPLED * motion.band_hz)), 1),
         channels=motion.channels[:m], position=position, velocity=velocity, acceleration=acceleration,
@@ -106,11 +106,11 @@ def _grounded_columns(motion: Motion, model: MechanicalModel, recording: Recordi
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     length = np.linalg.norm(model.input, axis=0)
-    for part, course in enumerate((motion.acceleration, motion.velocity, motion.position)):
+    for part, signal in enumerate((motion.acceleration, motion.velocity, motion.position)):
         for number, (i, j) in enumerate(pairs, part * len(pairs)):
-            added = np.zeros((len(course), m))
-            added[:, i] = course[:, j]
-            added[:, j] = course[:, i]
+            added = np.zeros((len(signal), m))
+            added[:, i] = signal[:, j]
+            added[:, j] = signal[:, i]
             yield tuning.deviation[number] * added / length
 
 

@@ -1,7 +1,23 @@
 """Confirms laws that a force balance named by fitting them by output error.
 
-Used where the model itself was fitted to the recordings: without a calibration, the size of its errors is unknown, and
-evidence is the gain on held-out data instead of a residual in units of noise.
+Theory of operation. Used where the model itself was fitted to the recordings. Without a calibration the size of the
+model's errors is unknown: a residual in units of noise says nothing, and the evidence is the gain on held-out data. The
+balance compares forces, where a wrong law may explain the model's own errors; a simulation compares responses.
+
+1. The named laws are added to the re-tuned model one after the other and fitted by output error, starting from the
+   balance's parameters, or from the model's own where these fail (`_from_starts`).
+2. With E the mean log error on held-out samples, the laws are confirmed if
+
+       E(with laws) <= E(without) + ln(CONFIRMED_LEAVES)         (a tenth less error)
+
+   and if the motion is predicted better than by its mean (`held_out_gain`).
+3. A law whose amplitude's 95 % interval contains zero is withdrawn, or replaced by the special case that lacks the
+   undetermined parameter, and the remaining laws are fitted again (`_find_vague_law`, `_prefer_special_case`).
+4. `explained` needs noise that is known from repeats, and held-out errors of at most `HELD_OUT_ERROR`; else the verdict
+   is `partly_explained`.
+
+References: Ljung, System Identification (1999), section 16.6 (validation on fresh data); Swevers and others, IEEE
+Control Systems 27(5):58 (2007) (laws by inverse dynamics, validated by simulation).
 """
 
 from collections.abc import Sequence
@@ -103,8 +119,8 @@ def _confirm(begun: _Confirming, named: Sequence[tuple[int, JudgedLaw]]) -> tupl
             errors = final_errors(context, explained)
             vague = _find_vague_law(explained, errors[len(context.tuning.names) :], begun.constants)
         if vague is None:
-            sealed = float(np.nanmax(after.score.test, initial=0.0))
-            whole = begun.repeats and as_good_as_noise(explained) and sealed <= HELD_OUT_ERROR
+            test_error = float(np.nanmax(after.score.test, initial=0.0))
+            whole = begun.repeats and as_good_as_noise(explained) and test_error <= HELD_OUT_ERROR
             judged = Judgement("explained" if whole else "partly_explained", True)
             return SearchResult(begun.whole, explained, judged, errors=errors), named
         simpler = None if errors is None else find_special_case(begun.balances, _without(named, vague), named[vague])
@@ -129,37 +145,37 @@ def _without(named: _Named, place: int, instead: tuple[int, JudgedLaw] | None = 
     return [*named[:place], *([] if instead is None else [instead]), *named[place + 1 :]]
 
 
-def require_enough_gain(seen: SearchResult, repeats: bool) -> SearchResult:
+def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
     """The result with only those effects named that take as much of the held-out error power as a law of a balance
     must, and `explained` only where repeats show the noise. Constants are numbers of the model and need no proof."""
-    found = seen.found
-    while found.steps and not _takes_enough(seen.context, found):
-        found = without_effect(seen.context, found, len(found.steps) - 1)
-        seen = replace(seen, found=found, judgement=judge(found), errors=None)
+    found = result.found
+    while found.steps and not _takes_enough(result.context, found):
+        found = without_effect(result.context, found, len(found.steps) - 1)
+        result = replace(result, found=found, judgement=judge(found), errors=None)
     names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed_effects()}
-    if repeats or seen.judgement.verdict != "explained" or names <= set(CONSTANTS):
-        return seen
-    return replace(seen, judgement=replace(seen.judgement, verdict="partly_explained"))
+    if repeats or result.judgement.verdict != "explained" or names <= set(CONSTANTS):
+        return result
+    return replace(result, judgement=replace(result.judgement, verdict="partly_explained"))
 
 
-def unname_doubtful_effects(seen: SearchResult) -> SearchResult:
+def unname_doubtful_effects(result: SearchResult) -> SearchResult:
     """The result with named effects of actuator and sensor made candidates, unless the signal itself shows them: the
     model was fitted to these recordings, so that a law of the motion that the catalogue lacks may look like a nonlinear
     or late sensor. What the signal shows is a candidate, too, where the model without it predicts nothing."""
-    found, demoted = seen.found, []
+    found, demoted = result.found, []
     doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
-    if len(doubtful) < len(found.steps) and not predicts_something(seen.context.whole, found.plain):
+    if len(doubtful) < len(found.steps) and not predicts_something(result.context.whole, found.plain):
         doubtful = list(range(len(found.steps)))
     for place in reversed(doubtful):
-        gain = held_out_gain(seen.context.whole, found.plain, seen.context.with_test_score(found.steps[place]))
+        gain = held_out_gain(result.context.whole, found.plain, result.context.with_test_score(found.steps[place]))
         if gain is not None and gain.gain > 0:
             why_not = BESIDE_RUNAWAY if found.steps[place].newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
             demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, why_not))
-        found = without_effect(seen.context, found, place)
+        found = without_effect(result.context, found, place)
     if not doubtful:
-        return seen
+        return result
     kept = tuple(sorted(demoted, key=lambda each: -each.gain))
-    return replace(seen, found=found, judgement=judge(found), errors=None, unconfirmed=(*seen.unconfirmed, *kept))
+    return replace(result, found=found, judgement=judge(found), errors=None, unconfirmed=(*result.unconfirmed, *kept))
 
 
 def _takes_enough(context: SearchContext, found: Explanation) -> bool:
@@ -229,8 +245,8 @@ def _find_vague_law(explained: Explanation, errors: FloatArray, constants: int) 
     return None
 
 
-def _all_of_some(said: Sequence[bool]) -> bool:
-    return bool(said) and all(said)
+def _all_of_some(flags: Sequence[bool]) -> bool:
+    return bool(flags) and all(flags)
 
 
 def leaves_open(result: SearchResult) -> bool:

@@ -13,7 +13,7 @@ from analysis.diagnosis.balance.judged_law import bootstrap_draws
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import BOOTSTRAP_LEVEL, HELD_OUT_STRETCHES, LEAST_HELD_OUT_STRETCHES, SEALED_SURPRISE
+from analysis.diagnosis.settings import BOOTSTRAP_LEVEL, HELD_OUT_STRETCHES, HELD_OUT_SURPRISE, LEAST_HELD_OUT_STRETCHES
 from equalizer.signals.signal import FloatArray
 
 
@@ -64,7 +64,7 @@ def _share_left(measure: ErrorMeasure, candidate: FittedCandidate, noise_taken: 
         return 0.0
     left = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit
     size = signal_rms(measure.records, masks)
-    moves = size > SEALED_SURPRISE * measure.noise
+    moves = size > HELD_OUT_SURPRISE * measure.noise
     if not moves.any():
         return 0.0
     noise = noise_taken * measure.noise[moves] ** 2

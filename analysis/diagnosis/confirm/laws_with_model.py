@@ -41,36 +41,36 @@ class ResultBesideModel:
 
 
 def judge_with_model(
-    recordings: Sequence[Recording], fitting: FittingMeasure, seen: SearchResult, time_left: TimeBudget
+    recordings: Sequence[Recording], fitting: FittingMeasure, result: SearchResult, time_left: TimeBudget
 ) -> ResultBesideModel:
     """The result by held-out gain, and the balances beside the model. seen: the result of the search by simulation."""
-    if seen.judgement.verdict not in ("unexplained", "partly_explained") or seen.found.statistic is not None:
-        return ResultBesideModel(seen)
+    if result.judgement.verdict not in ("unexplained", "partly_explained") or result.found.statistic is not None:
+        return ResultBesideModel(result)
     known_noise = all(floor.how == "repeats" for floor in fitting.chosen.floors)
-    balances = find_balances_beside_model(recordings, fitting.model, seen.context.barred, time_left)
-    near = float(np.nanmax(seen.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
-    if seen.judgement.named or seen.found.barred:
-        return ResultBesideModel(seen, balances)
+    balances = find_balances_beside_model(recordings, fitting.model, result.context.barred, time_left)
+    near = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
+    if result.judgement.named or result.found.barred:
+        return ResultBesideModel(result, balances)
     if known_noise and near:
         why_not = "the noise is known here, and what it leaves is more than noise"
         return ResultBesideModel(
-            replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed_candidates(seen, why_not))), balances
+            replace(result, unconfirmed=(*result.unconfirmed, *_unconfirmed_candidates(result, why_not))), balances
         )
-    why_not = objection(seen, balances)
-    if seen.found.steps and not why_not:
-        return ResultBesideModel(replace(seen, judgement=Judgement("partly_explained", True)), balances)
-    found = search_by_balance(seen.context, balances, known_noise) if balances else None
+    why_not = objection(result, balances)
+    if result.found.steps and not why_not:
+        return ResultBesideModel(replace(result, judgement=Judgement("partly_explained", True)), balances)
+    found = search_by_balance(result.context, balances, known_noise) if balances else None
     if found is not None and not objection(found, balances):
         judged = replace(found.judgement, verdict="partly_explained")
-        return ResultBesideModel(replace(found, judgement=judged, remarks=seen.remarks), balances)
+        return ResultBesideModel(replace(found, judgement=judged, remarks=result.remarks), balances)
     return ResultBesideModel(
-        replace(seen, unconfirmed=(*seen.unconfirmed, *_unconfirmed_candidates(seen, why_not))), balances
+        replace(result, unconfirmed=(*result.unconfirmed, *_unconfirmed_candidates(result, why_not))), balances
     )
 
 
-def objection(seen: SearchResult, balances: Sequence[Balance]) -> str:
+def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     """Why the effects found are not named, as a sentence; empty where they are."""
-    context, found = seen.context, seen.found
+    context, found = result.context, result.found
     if not found.steps:
         return "it takes too little of the error to be added"
     whole = held_out_gain(context.whole, found.plain, found.after)
@@ -84,7 +84,7 @@ def objection(seen: SearchResult, balances: Sequence[Balance]) -> str:
         return f"on held-out data it takes {100 * min(whole.gain, last.gain):.0f} % of the error's power, not a third"
     if np.any(np.abs(found.after.fitted.deviations) >= AT_RETUNING_BOUND * RETUNING_BOUND):
         return "beside it, a number of the model stands at the end of its tolerance"
-    rival = _best_rival(context, seen)
+    rival = _best_rival(context, result)
     if rival is not None and _not_better(context, rival, found.after):
         return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"
     claims = found.after.fitted.hypothesis.claims
@@ -98,16 +98,16 @@ def _not_better(context: SearchContext, rival: FittedCandidate, after: FittedCan
     return ahead is None or ahead.low <= 0
 
 
-def _best_rival(context: SearchContext, seen: SearchResult) -> FittedCandidate | None:
+def _best_rival(context: SearchContext, result: SearchResult) -> FittedCandidate | None:
     """The best rival of the last effect that is no refinement of it, scored on held-out samples; None = there is
     none."""
-    steps = seen.found.steps
-    if len(seen.found.rounds) < len(steps):
+    steps = result.found.steps
+    if len(result.found.rounds) < len(steps):
         return None
     best = steps[-1]
     others = [
         other
-        for other in seen.found.rounds[len(steps) - 1]
+        for other in result.found.rounds[len(steps) - 1]
         if other.newest != best.newest and not only_refines(other, best)
     ]
     return context.with_test_score(others[0]) if others else None
@@ -124,18 +124,18 @@ def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
     return claim.effect.name in names
 
 
-def _unconfirmed_candidates(seen: SearchResult, why_not: str) -> tuple[Unconfirmed, ...]:
+def _unconfirmed_candidates(result: SearchResult, why_not: str) -> tuple[Unconfirmed, ...]:
     """The best candidates of the round in which the search ended, the largest gain first."""
-    rounds = [fitted_candidates for fitted_candidates in seen.found.rounds if fitted_candidates]
+    rounds = [fitted_candidates for fitted_candidates in result.found.rounds if fitted_candidates]
     if not rounds:
         return ()
-    number = max(min(len(seen.found.steps), len(rounds)) - 1, 0)
+    number = max(min(len(result.found.steps), len(rounds)) - 1, 0)
     first: dict[str, FittedCandidate] = {}
     for candidate in rounds[number]:
         first.setdefault(candidate.newest, candidate)
     found = []
     for place, candidate in enumerate([*first.values()][:CANDIDATES_WITH_GAIN]):
-        gain = held_out_gain(seen.context.whole, seen.found.plain, seen.context.with_test_score(candidate))
+        gain = held_out_gain(result.context.whole, result.found.plain, result.context.with_test_score(candidate))
         if gain is not None and gain.gain > 0:
             found.append(
                 Unconfirmed(candidate.fitted.hypothesis, gain.gain, why_not if place == 0 else _why_behind(gain))

@@ -27,19 +27,24 @@ CommandChange = Callable[[FloatArray, float], FloatArray]
 AROUND = (0.75, 1.35)
 """Range of sizes over which the change for size 1 may be scaled."""
 GRID = 12
+"""Number of sizes that are tried for faults which are nonlinear in their size, on a logarithmic grid."""
 BEGUN = (0.0, 0.25, 0.5)
 """Shares of a drift that had occurred before the recording began."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Axis:
+    """A driven axis."""
+
     number: int
     name: str
 
     def fault(self, effect: str, variants: Sequence[Variant]) -> Fault:
         return Fault(effect, "actuator", self.name, self.number, tuple(variants))
 
-    def of(self, made: CommandChange) -> Undo:
+    def undo_by(self, made: CommandChange) -> Undo:
+        """The function that replaces this axis's command by the force which the faulty actuator made of it."""
+
         def undo(part: Part) -> Part:
             command = part.command.copy()
             command[:, self.number] = made(command[:, self.number], part.rate_hz)
@@ -56,8 +61,10 @@ def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: boo
     top = float(np.abs(whole).max(initial=0.0)) or 1.0
     rms = float(np.std(whole)) or top
     yield from _gains(axis, by_force)
-    yield axis.fault("force_offset", [Variant((axis.of(lambda u, rate: u + rms),), proportional_number("offset", rms))])
-    cubed = Variant((axis.of(lambda u, rate: u + u**3 / top**2),), proportional_number("cubic", 1 / top**2))
+    yield axis.fault(
+        "force_offset", [Variant((axis.undo_by(lambda u, rate: u + rms),), proportional_number("offset", rms))]
+    )
+    cubed = Variant((axis.undo_by(lambda u, rate: u + u**3 / top**2),), proportional_number("cubic", 1 / top**2))
     yield axis.fault("actuator_cubic", [cubed])
     longest = max(parts, key=lambda part: len(part.command))
     times = delays_to_try(longest.command[:, number], longest.rate_hz)
@@ -84,7 +91,7 @@ def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
         return 1 / (1 + size) if by_force else 1 + size
 
     yield axis.fault("force_gain", [
-        Variant((axis.of(lambda u, rate: 2 * u),), lambda s: {"gain": gain(float(s[0]))}, -0.9, 20.0,
+        Variant((axis.undo_by(lambda u, rate: 2 * u),), lambda s: {"gain": gain(float(s[0]))}, -0.9, 20.0,
                 column_change=lambda x, rate, part: 2 * x),
     ])  # fmt: skip
     drifts = [_gain_drift(axis, begun, lambda s: {"change": gain(float(s[0])) - 1}) for begun in BEGUN]
@@ -93,7 +100,7 @@ def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
 
 def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
     def ramp(part: Part, count: int) -> FloatArray:
-        passed = 1 + drift_course(part, begun)
+        passed = 1 + drift_shape(part, begun)
         return np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(passed)), passed)[:, None]
 
     def undo(part: Part) -> Part:
@@ -104,7 +111,7 @@ def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
     return Variant((undo,), numbers, -0.9, 20.0, column_change=lambda x, rate, part: x * ramp(part, len(x)))
 
 
-def drift_course(part: Part, begun: float) -> FloatArray:
+def drift_shape(part: Part, begun: float) -> FloatArray:
     """(n,): a drift to 1 at the end of the file, of which a share `begun` had occurred before the file began."""
     return np.asarray(begun + (1 - begun) * part.elapsed_share)
 
@@ -114,7 +121,7 @@ def _delay(axis: _Axis, time_s: float) -> Variant:
 
     def undo(part: Part) -> Part:
         late = time_s * part.rate_hz
-        undone = axis.of(lambda u, rate: shift_samples(u[:, None], late)[:, 0])(part)
+        undone = axis.undo_by(lambda u, rate: shift_samples(u[:, None], late)[:, 0])(part)
         return replace(undone, known=part.known & (np.arange(len(part.known)) >= late))
 
     about = lambda size: _delay(axis, size * time_s)  # noqa: E731
@@ -123,23 +130,23 @@ def _delay(axis: _Axis, time_s: float) -> Variant:
 
 
 def _lag(axis: _Axis, time_s: float) -> Variant:
-    undo = axis.of(lambda u, rate: apply_lag(u, time_s * rate))
+    undo = axis.undo_by(lambda u, rate: apply_lag(u, time_s * rate))
     change: ColumnChange = lambda x, rate, part: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
     about = lambda size: _lag(axis, size * time_s)  # noqa: E731
     return Variant((undo,), proportional_number("time_constant", time_s), *AROUND, column_change=change, about=about)
 
 
 def _saturation(axis: _Axis, limit: float) -> Variant:
-    return Variant((axis.of(lambda u, rate: np.clip(u, -limit, limit)),), lambda s: {"limit": limit}, 0.6, 1.5)
+    return Variant((axis.undo_by(lambda u, rate: np.clip(u, -limit, limit)),), lambda s: {"limit": limit}, 0.6, 1.5)
 
 
 def _slew_limit(axis: _Axis, limit: float) -> Variant:
-    undo = axis.of(lambda u, rate: limit_slew(u, 1 / rate, limit, float(u[0]), at_end=True))
+    undo = axis.undo_by(lambda u, rate: limit_slew(u, 1 / rate, limit, float(u[0]), at_end=True))
     return Variant((undo,), lambda s: {"rate": limit}, 0.6, 1.5)
 
 
 def _deadband(axis: _Axis, width: float) -> Variant:
-    undo = axis.of(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
+    undo = axis.undo_by(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
     about = lambda size: _deadband(axis, size * width)  # noqa: E731
     return Variant((undo,), proportional_number("width", width), *AROUND, about=about)
 

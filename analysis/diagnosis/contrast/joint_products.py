@@ -34,7 +34,7 @@ class Grams:
     """Per size, the columns that change."""
     width: int
 
-    def is_sound(self, variant: Variant) -> bool:
+    def is_well_conditioned(self, variant: Variant) -> bool:
         """Whether undoing the fault is well-conditioned. Sizes that may have any value are in SI units (a mass of 1 kg
         on a device of 1 mg), so that their products may be of any magnitude."""
         most = BLOWN_UP if np.isfinite(variant.most) else np.inf

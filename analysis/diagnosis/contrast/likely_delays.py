@@ -57,7 +57,7 @@ def _made_by(stream: Stream, rows: FloatArray) -> FloatArray:
     pushed = np.arange(len(weights)) == 0
     if isinstance(stream.base, AutoregressiveBase):
         pushed = stream.base.command_columns(len(weights))
-    return apply_filter(stream.colour, rows @ np.column_stack([weights * ~pushed, -weights * pushed]))[REACH:-REACH]
+    return apply_filter(stream.whitening, rows @ np.column_stack([weights * ~pushed, -weights * pushed]))[REACH:-REACH]
 
 
 def _rows_late(stream: Stream) -> float:

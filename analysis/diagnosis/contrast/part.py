@@ -29,7 +29,7 @@ class Part:
     known: Mask
     """(n,)"""
     start: int
-    """Its first sample in the file: drifts and clocks also run between the parts."""
+    """Index of the part's first sample in its file: drifts and clocks also run between the parts."""
     whole: int
     """Samples of the file."""
 

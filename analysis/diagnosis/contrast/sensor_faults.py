@@ -11,7 +11,7 @@ from analysis.diagnosis.contrast.actuator_faults import (
     BEGUN,
     GRID,
     delays_to_try,
-    drift_course,
+    drift_shape,
     median_frequency_hz,
 )
 from analysis.diagnosis.contrast.fault import (
@@ -36,6 +36,7 @@ Read = Callable[[FloatArray, float], FloatArray]
 WIDELY = (0.5, 1.6)
 """Range of sizes, as `AROUND`, for faults that act nearly in proportion to their size."""
 GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
+"""Gains that are tried first; between neighbours a fit interpolates."""
 SHIFTS = (0.03, 0.1, 0.3, 0.7, 1.2)
 """Offsets and drifts, over the channel's rms."""
 BENT = (0.02, 0.06, 0.15, 0.3)
@@ -167,7 +168,7 @@ def _offset(channel: _Channel, shift: float) -> Variant:
 def _drift(channel: _Channel, total: float, begun: float) -> Variant:
     def undo(part: Part) -> Part:
         response = part.response.copy()
-        response[:, list(channel.numbers)] -= total * drift_course(part, begun)[:, None]
+        response[:, list(channel.numbers)] -= total * drift_shape(part, begun)[:, None]
         return replace(part, response=response)
 
     return Variant((undo,), proportional_number("total", total), *WIDELY)

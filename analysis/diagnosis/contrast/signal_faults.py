@@ -35,9 +35,9 @@ class SignalFault:
 
 def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
     found = [
-        (*seen, channel)
+        (*mains_line, channel)
         for channel in range(faulty[0].response.shape[1])
-        if (seen := _find_mains_line(faulty, clean, channel)) is not None
+        if (mains_line := _find_mains_line(faulty, clean, channel)) is not None
     ]
     if not found:
         return None

@@ -62,7 +62,7 @@ class Stream:
     base: Base
     clean: Side
     other: Side
-    colour: FloatArray
+    whitening: FloatArray
     """Coefficients of the whitening filter of the errors."""
     columns: FloatArray
     """(1 + columns,): rms of each."""
@@ -88,15 +88,15 @@ class Stream:
     def _changes(self, side: Side, undone: Undone, at: Places) -> FloatArray:
         """(valid samples, k): the changes of the columns `at`, whitened."""
         differences = [part[:, at] - plain[:, at] for part, plain in zip(undone.rows, side.rows, strict=True)]
-        found = _whiten(self.colour, differences, side.masks) / (self.columns[at] * side.scale)
+        found = _whiten(self.whitening, differences, side.masks) / (self.columns[at] * side.scale)
         if undone.lost is not None:
             found[np.concatenate([gone[mask] for gone, mask in zip(undone.lost, side.masks, strict=True)])] = 0.0
         return np.asarray(found)
 
 
-def _whiten(colour: FloatArray, rows: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
+def _whiten(whitening: FloatArray, rows: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
     """(valid samples, k): rows of all parts through the whitening filter."""
-    return np.concatenate([apply_filter(colour, part)[mask] for part, mask in zip(rows, masks, strict=True)])
+    return np.concatenate([apply_filter(whitening, part)[mask] for part, mask in zip(rows, masks, strict=True)])
 
 
 def apply_filter(steps: FloatArray, samples: FloatArray) -> FloatArray:
@@ -127,13 +127,13 @@ def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Strea
     columns = np.sqrt(np.mean(everything**2, axis=0))
     columns = np.where(columns > 0, columns, 1.0)
     residuals = [_residuals(rows[side], masks[side], columns) for side in (0, 1)]
-    colour = _whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
+    whitening = _whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
     sides = []
     for parts, own, kept in zip((clean, other), rows, masks, strict=True):
-        white = _whiten(colour, own, kept) / columns
+        white = _whiten(whitening, own, kept) / columns
         scale = _white_error(white)
         sides.append(Side(tuple(parts), own, kept, scale, white / scale))
-    return Stream(base, sides[0], sides[1], colour, columns, gap_reach)
+    return Stream(base, sides[0], sides[1], whitening, columns, gap_reach)
 
 
 def _settled(valid: Mask, gap_reach: int) -> Mask:
@@ -186,8 +186,9 @@ def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> Fl
 def rows_with_fault_undone(stream: Stream, side: Side, fault: Fault, variant: Variant) -> list[Undone]:
     """Rows with a fault of size 1 undone, one set of rows per size of the variant."""
     found = []
-    tells = fault.place == (made := _source_of(stream.base))[0] and fault.site in (made[1], EVERY)
-    if tells and variant.column_change is not None and isinstance(stream.base, ForceBase):
+    # Undoing a fault of the predicted signal scales the errors: then the Jacobian of the undoing counts.
+    is_predicted = fault.place == (made := _source_of(stream.base))[0] and fault.site in (made[1], EVERY)
+    if is_predicted and variant.column_change is not None and isinstance(stream.base, ForceBase):
         rate_hz = stream.base.rate_hz
         changed = (
             variant.column_change(rows[:, 1:], rate_hz, part) for rows, part in zip(side.rows, side.parts, strict=True)
@@ -197,14 +198,16 @@ def rows_with_fault_undone(stream: Stream, side: Side, fault: Fault, variant: Va
         undone = tuple(undo(part) for part in side.parts)
         still = all(a.response is b.response for a, b in zip(undone, side.parts, strict=True))
         rows = stream.base.rows(undone, side.rows if still else None)
-        unit = variant.unit if tells else 1.0
-        unit *= _unit_of_curve(stream, side, variant.curve) if tells and variant.curve is not None else 1.0
+        unit = variant.unit if is_predicted else 1.0
+        unit *= _unit_of_curve(stream, side, variant.curve) if is_predicted and variant.curve is not None else 1.0
         unit /= (
-            variant.passed if tells and isinstance(stream.base, AutoregressiveBase) and stream.base.step == 1 else 1.0
+            variant.passed
+            if is_predicted and isinstance(stream.base, AutoregressiveBase) and stream.base.step == 1
+            else 1.0
         )
         known = all(a.known is b.known for a, b in zip(undone, side.parts, strict=True))
         lost = None if known else _lost_rows(stream, side, undone)
-        unit *= _spread_ratio(side, rows) if tells and fault.place == "actuator" else 1.0
+        unit *= _spread_ratio(side, rows) if is_predicted and fault.place == "actuator" else 1.0
         found.append(Undone(rows if unit == 1.0 else tuple(unit * part for part in rows), lost))
     return found
 

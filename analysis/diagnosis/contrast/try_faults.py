@@ -47,13 +47,14 @@ def try_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: Ti
 
 
 def _try_variant(bare: Sequence[Pair], streams: Sequence[Stream], fault: Fault, variant: Variant) -> Tried | None:
-    """None where undoing the fault is ill-conditioned. bare: the pairs with nothing undone."""
+    """Undo the fault by this variant and measure what error remains; None where undoing it is ill-conditioned. bare:
+    the pairs with nothing undone."""
     pairs = [
         replace(pair, with_it=stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, fault, variant)))
         for stream, pair in zip(streams, bare, strict=True)
     ]
-    sound = all(pair.with_it.is_sound(variant) for pair in pairs)
-    return (fit_sizes(pairs, variant), fault, variant, pairs) if sound else None
+    well_conditioned = all(pair.with_it.is_well_conditioned(variant) for pair in pairs)
+    return (fit_sizes(pairs, variant), fault, variant, pairs) if well_conditioned else None
 
 
 def _error_of(tried: Tried) -> float:

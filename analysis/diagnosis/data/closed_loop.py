@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from analysis.diagnosis.settings import FED_BACK_SHARE, FORETOLD_SHARE
+from analysis.diagnosis.settings import FED_BACK_SHARE, PREDICTED_SHARE
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 
 PAST = 6
-"""Past samples of each signal that the command is predicted from."""
+"""Past samples of each signal from which the command is predicted."""
 _LEAST = 200
+"""Fewest known samples for the test."""
 
 
 def is_in_closed_loop(recording: Recording) -> bool:
@@ -25,20 +26,22 @@ def is_in_closed_loop(recording: Recording) -> bool:
 
 
 def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> bool:
+    """Whether past responses improve the prediction of the command from its own past: Granger causality, by the ratio
+    of the rms residuals of two autoregressions."""
     signals = [recording.response.samples]
     if recording.position is not None:
         signals.append(recording.position.samples)
-    seen = np.hstack(signals)
-    known = np.isfinite(seen).all(axis=1) & np.isfinite(command)
+    measured = np.hstack(signals)
+    known = np.isfinite(measured).all(axis=1) & np.isfinite(command)
     rows = np.arange(PAST, len(command))
     rows = rows[np.all([known[rows - back] for back in range(PAST + 1)], axis=0)]
     if len(rows) < _LEAST:
         return False
     own = np.column_stack([command[rows - back] for back in range(1, PAST + 1)] + [np.ones(len(rows))])
-    others = np.column_stack([seen[rows - back] for back in range(PAST)])
+    others = np.column_stack([measured[rows - back] for back in range(PAST)])
     alone, helped = _residual_rms(command[rows], own), _residual_rms(command[rows], np.hstack([own, others]))
     # A smooth command is predicted by its own past alone, so that the test has no power.
-    return bool(alone > 1e-6 * _rms(command[:, None]) and helped < FORETOLD_SHARE * alone)
+    return bool(alone > 1e-6 * _rms(command[:, None]) and helped < PREDICTED_SHARE * alone)
 
 
 def _residual_rms(aim: FloatArray, by: FloatArray) -> float:

@@ -18,7 +18,7 @@ def bridge_gaps(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[
     """The recordings with gaps in their commands filled or cut out, and a sentence for each that was changed. A
     recording of which too much would be lost is not changed."""
     found = [_bridge_or_cut(recording, name) for recording, name in zip(recordings, names, strict=True)]
-    return tuple(each for each, _ in found), tuple(said for _, said in found if said)
+    return tuple(each for each, _ in found), tuple(remark for _, remark in found if remark)
 
 
 def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
@@ -37,7 +37,7 @@ def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
     if wide:
         stretches = [{"start": start, "stop": stop} for start, stop in parts]
         filled = replace(filled, meta={**recording.meta, "parts": stretches})
-    said = [
+    texts = [
         f"{len(chosen)} gap{'s' if len(chosen) != 1 else ''} ({sum(b - a for a, b in chosen)} samples) {what}"
         for chosen, what in (
             (narrow, "bridged by straight lines, as they hardly differ from the command over so short a time"),
@@ -45,7 +45,7 @@ def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
         )
         if chosen
     ]
-    return filled, f"{name} misses the command in places: {', '.join(said)}."
+    return filled, f"{name} misses the command in places: {', '.join(texts)}."
 
 
 def _can_bridge(samples: FloatArray, gap: int) -> bool:

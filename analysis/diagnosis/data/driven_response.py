@@ -24,6 +24,7 @@ DRIVEN = 0.01
 SHARED_BY_WINDOW = 2.0
 """Number of neighbouring lines that count as one independent line, because the Hann window correlates them."""
 RANK = 1e-6
+"""Least singular value of the drive, relative to the largest, that counts as a direction of its own."""
 MEMORY, MOST_TAPS, RIDGE = 0.1, 100, 1e-3
 """Share of a recording that the predicting filter spans, most coefficients per command, and ridge parameter."""
 

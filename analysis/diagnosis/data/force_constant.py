@@ -40,8 +40,8 @@ def with_force_constant(recording: Recording, constants: Sequence[float]) -> tup
     own = recording.excitation
     fits = own is not None and len(own.channels) == len(command.channels)
     per = "" if command.units[0] == "1" else f" per {command.units[0]}"
-    said = ", ".join(f"{constant:g}" for constant in constants)
+    text = ", ".join(f"{constant:g}" for constant in constants)
     return (
         replace(recording, command=pushed(command), excitation=pushed(own) if own is not None and fits else own),
-        f"The commands were multiplied by the {quantity} constant that was stated, {said} {unit}{per}.",
+        f"The commands were multiplied by the {quantity} constant that was stated, {text} {unit}{per}.",
     )

@@ -28,6 +28,7 @@ EXACT = 1e-6
 ROUNDED = 1e-3
 """Largest rms difference between periods due to rounding, relative to the command's rms."""
 MOST_SAMPLES = 2**19
+"""Samples in which a period is looked for: limits the time of the correlation."""
 
 
 def find_segments(recording: Recording) -> tuple[Recording, str]:

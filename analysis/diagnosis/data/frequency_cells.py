@@ -30,3 +30,4 @@ def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[st
 
 
 _DRIVEN = 0.01
+"""Least power of a driven command, relative to the strongest."""

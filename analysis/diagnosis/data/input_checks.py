@@ -23,16 +23,13 @@ from analysis.diagnosis.settings import (
 )
 from equalizer.effects.placing import PlacingError, place_recorded_effects
 from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
 
-class NothingToDiagnose(ValueError):  # noqa: N818 - an answer that a user reads
+class NothingToDiagnose(ListedProblemsError):  # noqa: N818 - an answer that a user reads
     """The recordings cannot be diagnosed. `problems`: one sentence each, without a full stop."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 def require_alike(

@@ -8,6 +8,7 @@ from equalizer.signals.signal import FloatArray
 
 _TINY = np.finfo(np.float64).tiny
 _LARGEST = 1e300
+"""Upper limit of an F ratio: SciPy returns NaN for infinity."""
 
 
 def noncentral_f_sf(

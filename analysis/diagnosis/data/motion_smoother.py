@@ -26,6 +26,7 @@ _PROCESS_NOISE = 1e-12
 """Process noise of all states per sample, relative to their size: without it the Riccati equation has no stabilising
 solution."""
 _DOUBLINGS = 40
+"""Most doublings: the filter then has run over 2^40 samples."""
 _MATRIX = types.float64[:, ::1]
 _READ = types.Array(types.float64, 2, "C", readonly=True)
 
@@ -169,7 +170,8 @@ def _smoother_gains(
 
 
 def _covariance_by_schur_form(advance: FloatArray, observed: FloatArray, process_noise: FloatArray) -> FloatArray:
-    """As `_steady_covariance`. Raises numpy.linalg.LinAlgError."""
+    """Steady prediction covariance by an ordered Schur form (SciPy), slower than by doubling. Raises
+    numpy.linalg.LinAlgError."""
     try:
         return np.asarray(solve_discrete_are(advance.T, observed.T, process_noise, np.eye(len(observed))))
     except ValueError as problem:  # not finite

@@ -36,7 +36,8 @@ class Observed:
     """(n,): held-out samples, used only in the end."""
 
     def unseal(self, opened: Mask) -> "Observed":
-        """With those of the held-out samples to fit and, of each stretch the last third, to choose by."""
+        """Copy in which the held-out samples of `opened` are used too: two thirds of each stretch to fit, the last
+        third to choose by."""
         opened = opened & self.test
         edges = np.flatnonzero(np.diff(np.concatenate([[0], opened.astype(np.int8), [0]]))).reshape(-1, 2)
         fit, choose = self.fit.copy(), self.choose.copy()
@@ -77,9 +78,9 @@ class Observed:
     def shorten(self) -> "Observed":
         """The record without the samples after the last one to fit or to choose by; its recording is not cut."""
         end = int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)
-        sealed = np.zeros(end, dtype=np.bool_)
+        no_test = np.zeros(end, dtype=np.bool_)
         return Observed(
-            self.recording, self.command[:end], self.measured[:end], self.fit[:end], self.choose[:end], sealed
+            self.recording, self.command[:end], self.measured[:end], self.fit[:end], self.choose[:end], no_test
         )
 
 

@@ -23,7 +23,7 @@ from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import is_within_data
 from analysis.diagnosis.search.verdict import judge
-from analysis.diagnosis.settings import LAW_MOST_ROUNDS, NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN, SEALED_ALONE_ERROR
+from analysis.diagnosis.settings import HELD_OUT_ALONE_ERROR, LAW_MOST_ROUNDS, NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import AxisForce
 from equalizer.laws.law import Law
@@ -77,8 +77,8 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
 
 
 def _needs_law(result: SearchResult) -> bool:
-    """Only whole simulations prove a law; where noise alone is left, there is none to be found, unless the names may
-    stand for it."""
+    """Whether a law may be searched for: only whole simulations prove one, and where noise alone remains, there is none
+    to be found, unless the names may stand for it."""
     context, found = result.context, result.found
     if (
         context.measure.name != "free simulation"
@@ -89,7 +89,7 @@ def _needs_law(result: SearchResult) -> bool:
         return False
     left = found.after if result.judgement.named and not may_stand_for_a_law(context, found) else found.retuned
     sealed = float(np.nanmax(left.score.test, initial=0.0))
-    return found.statistic is None and (left.score.worst_channel > NOISE_ALONE or sealed > SEALED_ALONE_ERROR)
+    return found.statistic is None and (left.score.worst_channel > NOISE_ALONE or sealed > HELD_OUT_ALONE_ERROR)
 
 
 def may_stand_for_a_law(context: SearchContext, named: Explanation) -> bool:

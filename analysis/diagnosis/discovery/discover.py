@@ -1,5 +1,8 @@
-"""Forward selection of discovered laws: where most is missing, on an axis or a reading, the best sum of terms is
-fitted."""
+"""Forward selection of discovered laws: where the largest excess error is, on an axis or a reading, sums of terms are
+screened, the best are fitted by output error, and the best fit is added; then again, up to `LAW_MOST_ROUNDS` laws.
+
+Steps and equations: see the theory of operation in the package's docstring (`analysis/diagnosis/discovery`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

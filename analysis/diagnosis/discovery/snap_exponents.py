@@ -1,4 +1,4 @@
-"""Rounds a law's exponents to whole or half numbers where their errors allow it, writes no memory that is shorter than a
+"""Rounds a law's exponents to whole or half numbers where their errors allow it, drops a memory that is shorter than a
 sample, and simplifies the formula."""
 
 import re

@@ -19,6 +19,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 
 WINDOW_S, OCTAVES = 1.0, 0.5
+"""Length of a Welch window in s, and width of a band in octaves."""
 LOWEST, HIGHEST = 2.0, 0.48
 """Edges of the bands, relative to a window's own line, and relative to the sample rate."""
 LONGEST_S, LEAST = 8.0, 256
@@ -68,8 +69,8 @@ class BandPower:
 
     def misfits(self, off: FloatArray) -> FitScore:
         """Rms by channel of a difference of logarithms `off`, on the samples to fit, choose and test by; NaN = none."""
-        seen = np.where(np.isnan(self.measured), np.nan, off)
-        return FitScore(*(_rms(seen[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
+        known_errors = np.where(np.isnan(self.measured), np.nan, off)
+        return FitScore(*(_rms(known_errors[[stretch.part == part for stretch in self.stretches]]) for part in PARTS))
 
     @cached_property
     def _edges(self) -> FloatArray:

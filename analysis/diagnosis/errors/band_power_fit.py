@@ -108,7 +108,7 @@ def evaluate_hypothesis(view: View, deviations: FloatArray, hypothesis: Hypothes
 
 
 def fit_band_power(view: View, start: BandPowerFit, rounds: int) -> BandPowerFit:
-    """The best fit within so many Gauss-Newton steps; never worse than the start."""
+    """The best fit within a number of Gauss-Newton steps; never worse than the start."""
     best = start
     for _ in range(rounds):
         if not np.isfinite(best.cost):

@@ -105,8 +105,8 @@ def _by_force(
 ) -> Chosen:
     known = place_recorded_effects(model, records[0].recording)
     views = force_views(records, model, floors, band_hz)
-    said = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
-    return Chosen(replace(views.measure, known=known), views.floors, tuple(filter(None, (*remarks, said))))
+    text = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
+    return Chosen(replace(views.measure, known=known), views.floors, tuple(filter(None, (*remarks, text))))
 
 
 def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ class ColouredMeasure:
     """An error measure with whitened residuals; they count where all samples that the filter uses are known."""
 
     plain: ErrorMeasure
-    colour: WhiteningFilter
+    whitening: WhiteningFilter
     unit: FloatArray
     noise: FloatArray
     """(c,): rms of the whitened residual of the reference recordings, in each channel's own unit."""
@@ -48,7 +48,7 @@ class ColouredMeasure:
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         left = self.plain.residuals(model, effects)
-        return tuple(self.colour.apply(residual * self.plain.unit) / self.unit for residual in left)
+        return tuple(self.whitening.apply(residual * self.plain.unit) / self.unit for residual in left)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
@@ -57,12 +57,12 @@ class ColouredMeasure:
         return self.plain.evidence(model, effects, self.plain.residuals(model, effects))
 
 
-def whiten_measure(plain: ErrorMeasure, colour: WhiteningFilter, noise: FloatArray) -> ColouredMeasure:
+def whiten_measure(plain: ErrorMeasure, whitening: WhiteningFilter, noise: FloatArray) -> ColouredMeasure:
     """The measure with whitened residuals. noise: (c,), see `ColouredMeasure`."""
-    warm = [_leave_out_warm_up(record, colour) for record in plain.records]
-    return ColouredMeasure(plain.with_records(tuple(warm)), colour, noise, noise)
+    warm = [_leave_out_warm_up(record, whitening) for record in plain.records]
+    return ColouredMeasure(plain.with_records(tuple(warm)), whitening, noise, noise)
 
 
-def _leave_out_warm_up(record: Observed, colour: WhiteningFilter) -> Observed:
-    warm = colour.warm(record.measured)
+def _leave_out_warm_up(record: Observed, whitening: WhiteningFilter) -> Observed:
+    warm = whitening.warm(record.measured)
     return replace(record, fit=record.fit & warm, choose=record.choose & warm, test=record.test & warm)

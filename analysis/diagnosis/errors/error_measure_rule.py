@@ -25,7 +25,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
-from analysis.diagnosis.data.growth_rate import is_unstable_within
+from analysis.diagnosis.data.growth_rate import free_motion_rates, is_unstable_within
 from analysis.diagnosis.data.measured_motion import has_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.windows import WINDOW_S
@@ -117,14 +117,7 @@ def _settling_samples(record: Observed, model: MechanicalModel) -> float:
 
 def _slowest_decay_rate(model: MechanicalModel) -> float:
     """Decay rate of the slowest free motion, 1/s; negative for one that grows."""
-    n = model.coordinates
-    motion = np.block(
-        [
-            [np.zeros((n, n)), np.eye(n)],
-            [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
-        ]
-    )
-    return -float(np.linalg.eigvals(motion).real.max())
+    return -float(free_motion_rates(model).real.max())
 
 
 def _begins_moving(record: Observed) -> bool:

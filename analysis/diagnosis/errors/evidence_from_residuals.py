@@ -28,7 +28,7 @@ def evidence_of(
     expected = EXPECTED * np.maximum(np.sqrt(np.mean(record.command**2, axis=0)), 1e-12)
     missing = missing_force(model, residuals, unit, rate_hz, expected)
     measured, predicted = without_gaps(record.measured, left * unit, played)
-    seen = measured.shape[1] > p
+    has_position = measured.shape[1] > p
     return Evidence(
         model=model,
         sample_rate_hz=rate_hz,
@@ -40,9 +40,9 @@ def evidence_of(
         predicted=predicted[:, :p],
         noise=noise[:p],
         used=(record.fit | record.choose).astype(np.float64),
-        position=measured[:, p:] if seen else None,
-        predicted_position=predicted[:, p:] if seen else None,
-        position_noise=noise[p:] if seen else None,
+        position=measured[:, p:] if has_position else None,
+        predicted_position=predicted[:, p:] if has_position else None,
+        position_noise=noise[p:] if has_position else None,
     )
 
 

@@ -11,6 +11,7 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
 
 _TINY = 1e-6
+"""Lower limit of an error, so that its logarithm is finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,7 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeSimulation:
-    """From rest at the first sample."""
+    """Output error of a simulation that starts at rest at the first sample and sees the commands alone."""
 
     records: tuple[Observed, ...]
     unit: FloatArray
@@ -61,10 +61,10 @@ class FreeSimulation:
     ) -> SimulationResult:
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
-        seen = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
+        measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         model = add_carried_weight(model, signals)
         every = [_coarsen(placed, self.coarser) for placed in under_conditions((*self.known, *effects), signals)]
-        return simulate(model, record.command, signals.sample_rate_hz, every, signals.hold, seen)
+        return simulate(model, record.command, signals.sample_rate_hz, every, signals.hold, measurement)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
@@ -94,5 +94,5 @@ def _subtract_prediction(measured: FloatArray, played: SimulationResult) -> Floa
 
 
 def predicted_channels(played: SimulationResult, count: int) -> FloatArray:
-    """(n, c): the response and, where there are so many channels, the position."""
+    """(n, count): the response and, where `count` includes it, the position."""
     return np.hstack([played.response, played.position])[:, :count]

@@ -14,6 +14,7 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 STRETCH_S = 0.5
+"""Length of the stretches over which residuals are summed: longer than their correlation time."""
 AT_AN_END = 1e-6
 """Distance of a coordinate from its bound up to which it counts as at the bound."""
 

@@ -1,7 +1,20 @@
-"""Output-error fit: regularised nonlinear least squares by bounded Gauss-Newton steps.
+"""Output-error fit: regularised nonlinear least squares by bounded, damped Gauss-Newton steps.
 
-Fitted are the model's own parameters, with their calibration as prior, and those of a hypothesis. The sensitivity to
-the model's own parameters is computed once and kept; that to the hypothesis's parameters, at each step.
+Theory of operation. Unknowns are d, the deviations of the model's own parameters in standard deviations of their
+calibration, and p, the parameters of a hypothesis (scaled to logarithms, starts or units). With the prediction errors e
+in units of the noise,
+
+    J(d, p) = (sum of e(d, p)² + d'd) / N            over the N samples to fit;  |d| <= RETUNING_BOUND,  p within bounds
+
+d'd is the calibration's prior: a maximum a posteriori estimate. One step solves, with S = [de/dd, de/dp],
+
+    (S'S + diag(1, 0)) step = -(S'e + (d, 0))        parameters that would leave their range are fixed at its end
+
+with growing multiples of the matrix's diagonal added until J falls (Marquardt's damping). de/dd costs one simulation
+per parameter of the model, so it is computed once and kept; de/dp is recomputed at each step, by finite differences.
+Standard errors: `intervals`.
+
+References: Ljung, System Identification (1999), section 10.2; Marquardt, J. SIAM 11:431 (1963).
 """
 
 from collections.abc import Sequence

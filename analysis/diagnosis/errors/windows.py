@@ -37,7 +37,8 @@ STATES = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """For plants that integrate freely, and for recordings that do not begin at rest."""
+    """Output error over windows, each from a fitted initial state (multiple shooting): for plants that integrate
+    freely, and for recordings that do not begin at rest."""
 
     records: tuple[Observed, ...]
     states: tuple[FloatArray, ...]
@@ -139,7 +140,7 @@ class Windows:
         entered = actuator_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
         found = smooth_motion(model, record, entered + played.axis_force, self.unit)
         measured, predicted = without_gaps(record.measured, left * self.unit, played)
-        seen = measured.shape[1] > p
+        has_position = measured.shape[1] > p
         return Evidence(
             model=model,
             sample_rate_hz=recording.sample_rate_hz,
@@ -151,9 +152,9 @@ class Windows:
             predicted=predicted[:, :p],
             noise=self.noise[:p],
             used=(record.fit | record.choose).astype(np.float64),
-            position=measured[:, p:] if seen else None,
-            predicted_position=predicted[:, p:] if seen else None,
-            position_noise=self.noise[p:] if seen else None,
+            position=measured[:, p:] if has_position else None,
+            predicted_position=predicted[:, p:] if has_position else None,
+            position_noise=self.noise[p:] if has_position else None,
         )
 
 
@@ -186,8 +187,8 @@ def _free_motion(structure: MechanicalModel, sample_rate_hz: float, length: int,
     for k in range(1, length):
         states[k] = steps.advance @ states[k - 1]
     response = low_pass(states.transpose(0, 2, 1) @ steps.response.T, sample_rate_hz, structure.sensor.bandwidth_hz)
-    seen = np.concatenate([response, states.transpose(0, 2, 1) @ steps.position.T], axis=2)
-    return np.asarray(seen[:, :, :count].transpose(0, 2, 1))
+    outputs = np.concatenate([response, states.transpose(0, 2, 1) @ steps.position.T], axis=2)
+    return np.asarray(outputs[:, :, :count].transpose(0, 2, 1))
 
 
 def _project_out(left: FloatArray, free: FloatArray) -> FloatArray:

@@ -69,8 +69,8 @@ def choose_structure(
     if given is None:
         ordered = sorted(fits, key=lambda each: each.model.coordinates)
         best = ordered[-1] if ordered[-1].error < (1 - MODES_GAIN) * ordered[0].error else ordered[0]
-        said = f"Structures were compared by the held-out error of a free simulation, because {why}."
-        return Choice(best, tried, said, remains(None, best))
+        text = f"Structures were compared by the held-out error of a free simulation, because {why}."
+        return Choice(best, tried, text, remains(None, best))
     best = choose_plainest(fits)
     reason = (
         f"{best.kind} is the structure of fewest numbers from which no other takes "
@@ -139,12 +139,12 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
         float(simulation_errors(model, lines, (min(ends), max(ends)))[0][-1])
         for model in (plain.fit.model, other.model)
     ]
-    said = f"In a free simulation mass-spring leaves {100 * errors[0]:.3g} %, two-mode {100 * errors[1]:.3g} %."
+    text = f"In a free simulation mass-spring leaves {100 * errors[0]:.3g} %, two-mode {100 * errors[1]:.3g} %."
     if errors[1] < (1 - MODES_GAIN) * errors[0]:
         tried = (*plain.tried, TriedStructure("two-mode", other.error, ""))
-        return Choice(other, tried, said, remains(None, other))
-    return _with_tried(plain, TriedStructure("two-mode", other.error, "modes take too little off"), said)
+        return Choice(other, tried, text, remains(None, other))
+    return _with_tried(plain, TriedStructure("two-mode", other.error, "modes take too little off"), text)
 
 
-def _with_tried(plain: Choice, tried: TriedStructure, said: str = "") -> Choice:
-    return Choice(plain.fit, (*plain.tried, tried), f"{plain.reason} {said}".rstrip(), plain.remains)
+def _with_tried(plain: Choice, tried: TriedStructure, text: str = "") -> Choice:
+    return Choice(plain.fit, (*plain.tried, tried), f"{plain.reason} {text}".rstrip(), plain.remains)

@@ -28,20 +28,20 @@ from equalizer.identification.mechanical.open_tolerance import widen_tolerance
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 
-RIGID_SAID = (
+RIGID_REMARK = (
     "No model was given. One body per axis, with damping and, where that shows, a spring, was fitted first to the "
     "forces along the measured motion; its damping is left open by a quarter, for friction hides in it."
 )
-BALANCE_SAID = (
+BALANCE_REMARK = (
     "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
     "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
 )
-UNTIMED_SAID = (
+UNTIMED_REMARK = (
     "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "
     "The mass in the file is a floor that no force shows; damping and mass are not known."
 )
 
-FREE_SAID = (
+FREE_REMARK = (
     "No model was given. A damper and a spring per axis were fitted first to the force per unit mass that the free "
     "motion shows; the mass in the file is a floor."
 )
@@ -66,12 +66,12 @@ def first_model_of(
         and any(map(is_quasi_static, recordings))
         and (still := _plain_structure(recordings, "massless")) is not None
     ):
-        return FirstModel(still, (UNTIMED_SAID,), balances)
+        return FirstModel(still, (UNTIMED_REMARK,), balances)
     model = plain_model(balances, recordings[0], "fitted to these recordings")
     if free and (held := model or _free_model(recordings)) is not None:
-        return FirstModel(_hold_mass(held), (FREE_SAID,), balances)
+        return FirstModel(_hold_mass(held), (FREE_REMARK,), balances)
     if model is not None:
-        return FirstModel(model, (BALANCE_SAID,), balances)
+        return FirstModel(model, (BALANCE_REMARK,), balances)
     on_progress("fitting a linear model, as none was given", 0.5)
     model, remarks = fit_first_linear_model(
         recordings, lambda share: on_progress("fitting a linear model, as none was given", 0.5 + share / 2)
@@ -90,7 +90,8 @@ def _free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
 
 
 def _plain_structure(recordings: Sequence[Recording], kind: Kind) -> MechanicalModel | None:
-    """None where no motion was measured along the commands, or that does not carry the structure."""
+    """Fit the plain structure by force balance; None where no motion was measured along the commands, or where the fit
+    fails."""
     try:
         return fit_structure(balance_recordings(recordings), kind).model
     except (StructureRefused, NoMotionError):
@@ -103,24 +104,24 @@ def fit_first_linear_model(
     """A linear model fitted by forces or spectra, with remarks. Raises NothingToDiagnose where none can be fitted."""
     _require_no_weight(recordings)
     if wants_rigid_model(recordings) and (rigid := _rigid_model(recordings, whose)) is not None:
-        return rigid, (RIGID_SAID,)
+        return rigid, (RIGID_REMARK,)
     try:
         fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {whose}")
         if not any(_answers(fit.model, recording) for recording in recordings):
             raise MechanicalFitRefused("the model that fits best hardly answers to the commands")
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         if (rigid := _rigid_model(recordings, whose)) is not None:
-            return rigid, (RIGID_SAID,)
+            return rigid, (RIGID_REMARK,)
         raise NothingToDiagnose((f"no model was given, and none can be fitted: {refusal}",)) from refusal
     tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on what was kept for a test"
-    said = (
+    text = (
         f"No model was given. A linear one was fitted to {whose} first, with an error of "
         f"{100 * fit.error:.1f} %{tested}, and its masses, dampers and springs were left open by much more than that; "
         "what it could take on itself, such as friction at one level as damping, is not missing from it any more, and "
         "is not named."
     )
     return widen_tolerance(fit.model), (
-        said,
+        text,
         *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks),
     )
 
@@ -143,7 +144,7 @@ def _require_no_weight(recordings: Sequence[Recording]) -> None:
 
 
 def _rigid_model(recordings: Sequence[Recording], whose: str) -> MechanicalModel | None:
-    """None where the recordings do not carry one."""
+    """Fit a rigid body; None where the recordings do not determine one."""
     if not can_be_rigid(recordings):
         return None
     try:

@@ -30,8 +30,8 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
     first = recordings[0]
     if set(first.response.quantities) & KNOWN:
         return recordings, ""
-    if said := _said_by_names(first):
-        return tuple(_with_quantity(each, said) for each in recordings), _sentence_of_names(first, said)
+    if named := _quantities_in_names(first):
+        return tuple(_with_quantity(each, named) for each in recordings), _sentence_of_names(first, named)
     if not is_driven(recordings):
         if set(first.response.units) != {UNSTATED}:
             return recordings, ""
@@ -45,21 +45,21 @@ def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...
         return recordings, ""
     names = conjoin(list(first.response.channels))
     return tuple(_with_quantity(each, quantity) for each in recordings), (
-        f"Nothing says what {names} measures: it was taken for a {quantity}, as its course suggests; if it is another, "
-        "say so in the map (quantity)."
+        f"Nothing says what {names} measures: it was taken for a {quantity}, as its time series suggests; if it is "
+        "another, say so in the map (quantity)."
     )
 
 
-def _said_by_names(recording: Recording) -> tuple[str, ...]:
+def _quantities_in_names(recording: Recording) -> tuple[str, ...]:
     """Quantities of the responses, where a name determines one that nothing else determines; else empty."""
     from equalizer.signals.quantity_words import quantity_in  # only where a quantity is missing
 
     response = recording.response
-    told = [
+    found = [
         named if unit == UNSTATED and (named := quantity_in(name)) in KNOWN else quantity
         for name, unit, quantity in zip(response.channels, response.units, response.quantities, strict=True)
     ]
-    return tuple(told) if set(told) & KNOWN else ()
+    return tuple(found) if set(found) & KNOWN else ()
 
 
 def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:

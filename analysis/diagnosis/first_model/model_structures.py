@@ -157,7 +157,8 @@ def fit_modal_structure(
 
 
 def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
-    """Of fits by force balance, the one with fewest numbers that no richer one beats significantly over the folds."""
+    """Return the fit by force balance with the fewest parameters, among those that no richer fit beats significantly
+    over the folds."""
     ordered = sorted(fits, key=lambda fit: (len(fit.numbers), fit.error))
     best = ordered[0]
     for other in ordered[1:]:
@@ -221,8 +222,10 @@ def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np
     return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))
 
 
-def _numbers(given: BalancedRecordings, fit: JointFit, said: tuple[UnitSystem, Sequence[Part]]) -> tuple[Number, ...]:
-    names, (system, parts) = given.recording.command.channels, said
+def _numbers(
+    given: BalancedRecordings, fit: JointFit, units_and_parts: tuple[UnitSystem, Sequence[Part]]
+) -> tuple[Number, ...]:
+    names, (system, parts) = given.recording.command.channels, units_and_parts
     return tuple(
         Number(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
                float(fit.halves[part][k, k]))

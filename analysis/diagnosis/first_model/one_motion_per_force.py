@@ -34,15 +34,15 @@ Step = Callable[[Recordings], tuple[Recordings, str]]
 def one_motion_per_force(recordings: Sequence[Recording], turns: bool = True) -> tuple[Recordings, tuple[str, ...]]:
     """The converted recordings, and a sentence for each change. recordings: alike in channels, units and rate. turns:
     commands that are counted against their motion are reversed; not where a model says already how they are counted."""
-    found, said = tuple(recordings), []
+    found, remarks = tuple(recordings), []
     steps: tuple[Step, ...] = (
         name_motion, read_free_motion, _separate_conditions, _select_imposed_motion, _select_motions, _select_forces,
         restore_sign, _drop_constant_commands, _merge_commands,
     )  # fmt: skip
     for step in (*steps, reverse_commands) if turns else steps:
         found, sentence = step(found)
-        said.append(sentence)
-    return found, tuple(filter(None, said))
+        remarks.append(sentence)
+    return found, tuple(filter(None, remarks))
 
 
 def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
@@ -65,7 +65,7 @@ def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
-    """Of an imposed motion recorded as position and speed, only the position."""
+    """Keep only the position of an imposed motion that was recorded as position and speed."""
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
         return recordings, ""
@@ -78,7 +78,7 @@ def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
-    """Of responses of several kinds, only the motions of the lowest derivative."""
+    """Keep only the motions of the lowest derivative, where the responses are of several kinds."""
     response = recordings[0].response
     quantities = set(response.quantities)
     if not quantities & MOTIONS or len({DERIVATIVE_OF_QUANTITY.get(quantity, -1) for quantity in quantities}) == 1:
@@ -92,7 +92,7 @@ def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
 
 
 def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
-    """Of several forces along fewer imposed motions, the strongest."""
+    """Keep only the strongest forces, where there are more forces than imposed motions."""
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
         return recordings, ""
@@ -207,7 +207,7 @@ def _lowest_derivative_channels(signal: Signal) -> list[int]:
 
 
 def _select_excitation(excitation: Signal | None, command: Signal, kept: Sequence[int]) -> Signal | None:
-    """None where there is no excitation, or none for each command."""
+    """The excitations of the kept commands; None where there is no excitation, or none for each command."""
     if excitation is None or len(excitation.channels) != len(command.channels):
         return None
     return excitation.select_channels(kept)

@@ -52,8 +52,8 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     sign = np.ones(count)
     sign[against] = -1.0
     verb = "is" if len(names) == 1 else "are"
-    told = {REVERSED: names}
-    turned = tuple(_reverse(replace(each, meta={**each.meta, **told}), imposed, sign) for each in recordings)
+    note = {REVERSED: names}
+    turned = tuple(_reverse(replace(each, meta={**each.meta, **note}), imposed, sign) for each in recordings)
     return turned, (
         f"{conjoin(names)} {verb} counted against the motion: as recorded, the device would give work instead of "
         f"taking it. The sign was turned round, and a model that is written has it in its input matrix; where the "

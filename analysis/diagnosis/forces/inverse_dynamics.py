@@ -12,6 +12,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _NEARLY_STILL_HZ = 1e-6
+"""Frequency at which the derivative of the inverse at 0 Hz is computed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +79,8 @@ def required_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
 
 
 def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
-    """For a model whose every coordinate is measured: the derivatives suffice, without another Fourier transform."""
+    """Required force of a model whose every coordinate is measured: the derivatives suffice, without another Fourier
+    transform."""
     to_coordinates = np.linalg.inv(model.output[: model.inputs])
     to_commands = np.linalg.inv(model.input)
     matrices = model.stiffness, model.damping, model.mass

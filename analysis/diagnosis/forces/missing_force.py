@@ -1,7 +1,12 @@
 """The force along each driven axis that would explain a model's residual, and the motion that it causes.
 
-Deconvolution through the model, line by line, regularised by the noise (Wiener filter; a latent force in the sense of
-Rogers and Friis 2021).
+Deconvolution through the model, regularised by the noise (Wiener filter): for each spectral line, with the residuals r
+and the model's transfer H from the m forces to the c channels, both in units of the noise,
+
+    f = (H* H + diag(1 / s²))^-1 H* r        s: expected rms of the force
+
+It is the mean of the posterior of a force with prior variance s² (a latent force in the sense of Rogers and Friis,
+Mech. Syst. Signal Process. 2021).
 """
 
 from dataclasses import dataclass
@@ -34,14 +39,14 @@ def missing_force(
     expected rms of such a force; larger values pass more force and more noise."""
     n, c = residuals.shape
     length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
-    seen = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))
-    through = np.concatenate([seen.response, seen.position], axis=1)[:, :c] / unit[:c, None]
+    transfer = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))
+    through = np.concatenate([transfer.response, transfer.position], axis=1)[:, :c] / unit[:c, None]
     spectrum = rfft(residuals, length, axis=0)
     adjoint = np.conj(np.swapaxes(through, 1, 2))
     normal = adjoint @ through + np.diag(1 / expected_n**2)
     force = np.linalg.solve(normal, adjoint @ spectrum[:, :, None])
     back = [
         irfft(part[:, :, 0], length, axis=0)[:n]
-        for part in (force, seen.axis_position @ force, seen.axis_velocity @ force)
+        for part in (force, transfer.axis_position @ force, transfer.axis_velocity @ force)
     ]
     return MissingForce(*back)

@@ -26,7 +26,8 @@ WEAKEST = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedForce:
-    """For a plant in closed loop, whose command depends on the response, and for one that drifts freely."""
+    """Error of the force that the model requires for the measured motion: for a plant in closed loop, whose command
+    depends on the response, and for one that drifts freely."""
 
     records: tuple[Observed, ...]
     """Records whose `measured` is the applied force within the band."""

@@ -20,6 +20,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _ROUNDS = 2
+"""Fits: the band in which forces are compared depends on the model, so the fit is repeated."""
 
 
 def wants_rigid_model(recordings: Sequence[Recording]) -> bool:
@@ -50,8 +51,8 @@ def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
 def _is_square(recording: Recording) -> bool:
     orders = [DERIVATIVE_OF_QUANTITY.get(quantity, 2) for quantity in recording.response.quantities]
     square = len(recording.command.channels) == len(recording.response.channels)
-    seen = recording.position if max(orders) == 2 else recording.response
-    return square and len(set(orders)) == 1 and seen is not None and len(seen.channels) == len(orders)
+    motion = recording.position if max(orders) == 2 else recording.response
+    return square and len(set(orders)) == 1 and motion is not None and len(motion.channels) == len(orders)
 
 
 def _unit_masses(recording: Recording, name: str) -> MechanicalModel:

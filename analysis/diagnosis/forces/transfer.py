@@ -11,11 +11,12 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _WELL_CONDITIONED = 1e8
+"""Largest condition number of the mode shapes for which modal coordinates are used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisTransfer:
-    """From a force held over each sample along each driven axis; each (lines, rows, m)."""
+    """Transfer functions from a force along each driven axis, held over each sample; each of shape (lines, rows, m)."""
 
     response: ComplexArray
     """To the response, as the sensor reads it."""
@@ -30,13 +31,13 @@ def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: F
     m, p = model.inputs, model.outputs
     z = np.exp(2j * np.pi * frequency_hz / sample_rate_hz)
     rows = np.vstack([steps.motion[: 2 * m], steps.response, steps.position])
-    seen = _frequency_response(steps.advance, steps.by_axis_force, rows, z)
+    responses = _frequency_response(steps.advance, steps.by_axis_force, rows, z)
     # A force takes effect from the next sample on; its direct feedthrough is read one sample late.
-    response = seen[:, 2 * m : 2 * m + p] + steps.response_by_axis_force * (1 / z)[:, None, None]
+    response = responses[:, 2 * m : 2 * m + p] + steps.response_by_axis_force * (1 / z)[:, None, None]
     if model.sensor.bandwidth_hz > 0:
         decay = np.exp(-2 * np.pi * model.sensor.bandwidth_hz / sample_rate_hz)
         response = response * ((1 - decay) / (1 - decay / z))[:, None, None]
-    return AxisTransfer(response, seen[:, 2 * m + p :], seen[:, :m], seen[:, m : 2 * m])
+    return AxisTransfer(response, responses[:, 2 * m + p :], responses[:, :m], responses[:, m : 2 * m])
 
 
 def _frequency_response(A: FloatArray, B: FloatArray, C: FloatArray, z: ComplexArray) -> ComplexArray:

@@ -66,11 +66,11 @@ def permutation_p_values(
 ) -> FloatArray:
     """(tests,): upper tails of a gamma distribution with the mean and variance of the permutations (Winkler and others
     2016), or counted, whichever applies. statistics: from permuted indices to statistics (tests,)."""
-    seen = statistics(np.arange(len(strata)))
+    observed = statistics(np.arange(len(strata)))
     chance = np.array([statistics(shuffle_blocks(strata, block, random)) for _ in range(permutations)])
     mean, variance = chance.mean(axis=0), np.maximum(chance.var(axis=0, ddof=1), np.finfo(np.float64).tiny)
-    p_values = gammaincc(mean**2 / variance, seen * mean / variance)
+    p_values = gammaincc(mean**2 / variance, observed * mean / variance)
     # Where enough permutations had a larger statistic, their share is used instead of the fitted tail.
-    counted = (np.sum(chance >= seen, axis=0) + 1) / (permutations + 1)
+    counted = (np.sum(chance >= observed, axis=0) + 1) / (permutations + 1)
     believed = np.where(counted > _COUNTED / (permutations + 1), counted, np.maximum(p_values, SMALLEST))
     return np.asarray(believed, dtype=np.float64)

@@ -46,12 +46,12 @@ def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
         return ""
     shares = conjoin([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
     count = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
-    said = (
+    text = (
         f"What a device in order differs by from its re-tuned model was learned from {count}: {shares} of the "
         f"channel's signal (the largest that was seen; in the map, times {floor.beyond:.2g}). So much counts as noise "
         "here, more of it where in frequency more of it lies. Named is only what explains more of what is diagnosed "
         f"than {floor.beyond:.2g} times what it explains of a clean recording."
     )
     if max(floor.channels) <= LEARNED_TOO_MUCH:
-        return said
-    return f"{said} That is much: what the clean recordings hold, too, cannot be found, and little faults hardly can."
+        return text
+    return f"{text} That is much: what the clean recordings hold, too, cannot be found, and little faults hardly can."

@@ -125,9 +125,11 @@ def _kinds(spectrum: SegmentSpectrum, channel: int, inside: Mask, where: _Where,
         found.append((kind, beyond, reached / chosen.sum(), int(chosen.sum())))
     if spectrum.count > 1:
         # Each line has count - 1 differences between periods.
-        seen = np.repeat(spectrum.spread[inside, channel], spectrum.count - 1)
+        spreads = np.repeat(spectrum.spread[inside, channel], spectrum.count - 1)
         beyond = excess(
-            seen, np.repeat(spectrum.floor[inside, channel], spectrum.count - 1), float(spectrum.floor_freedom[channel])
+            spreads,
+            np.repeat(spectrum.floor[inside, channel], spectrum.count - 1),
+            float(spectrum.floor_freedom[channel]),
         )
         found.append(("varying", beyond, 1 / (spectrum.count - 1), int(inside.sum())))
     return [

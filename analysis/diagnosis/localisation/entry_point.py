@@ -59,12 +59,12 @@ def sensor_rule(spectra: ResidualSpectra, derivative: int) -> SensorRule | None:
     if telling.sum() < SENSOR_LEAST_LINES:
         return SensorRule("undecided", 0.0, 0.0)
     expected = float(np.mean((moved / noise)[telling]))
-    seen = float(np.mean(((position - noise) / noise)[telling]))
+    observed = float(np.mean(((position - noise) / noise)[telling]))
     # Per line, so that a few strong lines do not dominate.
     share = float(np.median(np.clip((position - noise)[telling] / moved[telling], 0, 2)))
     if share < SENSOR_ABSENT:
-        return SensorRule("response sensor", expected, seen)
-    return SensorRule("motion" if share > SENSOR_PRESENT else "undecided", expected, seen)
+        return SensorRule("response sensor", expected, observed)
+    return SensorRule("motion" if share > SENSOR_PRESENT else "undecided", expected, observed)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

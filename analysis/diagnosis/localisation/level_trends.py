@@ -67,24 +67,30 @@ def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distorti
     levels = np.array([cell.amplitude for cell in cells])
     relative_db = 20 * np.log10(np.maximum(sizes, _TINY) / np.maximum(signals, _TINY))
     p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
-    seen = np.array([cell.p_value < DISTORTION_P for cell in cells])
-    slope = _slope_with_limits(levels, relative_db, np.array([cell.lines for cell in cells]), seen)
+    significant = np.array([cell.p_value < DISTORTION_P for cell in cells])
+    slope = _slope_with_limits(levels, relative_db, np.array([cell.lines for cell in cells]), significant)
     if key[4]:
         band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
         key = (*key[:3], band, *key[4:])
-    return LevelTrend(*key, float(relative_db[-1]), p_value, slope, bool(seen.any() and not seen[0]))
+    return LevelTrend(*key, float(relative_db[-1]), p_value, slope, bool(significant.any() and not significant[0]))
 
 
-def _slope_with_limits(levels: FloatArray, relative_db: FloatArray, lines: FloatArray, seen: Mask) -> float | None:
+def _slope_with_limits(
+    levels: FloatArray, relative_db: FloatArray, lines: FloatArray, significant: Mask
+) -> float | None:
     """Slope. Where the distortion is not significant at a level, the detection limit there bounds the slope: from below
     at the lowest level, from above at the highest."""
-    if not seen.any() or not (levels > 0).all() or len(set(levels)) < 2:
+    if not significant.any() or not (levels > 0).all() or len(set(levels)) < 2:
         return None
     bounded = _slope(np.log2(levels), relative_db, lines)
-    rises, falls = bounded > STEADY_DB and not seen[0], bounded < -STEADY_DB and not seen[-1]
-    if seen.all() or rises or falls:
+    rises, falls = bounded > STEADY_DB and not significant[0], bounded < -STEADY_DB and not significant[-1]
+    if significant.all() or rises or falls:
         return bounded
-    return _slope(np.log2(levels[seen]), relative_db[seen], lines[seen]) if len(set(levels[seen])) > 1 else None
+    return (
+        _slope(np.log2(levels[significant]), relative_db[significant], lines[significant])
+        if len(set(levels[significant])) > 1
+        else None
+    )
 
 
 def _slope(doublings: FloatArray, relative_db: FloatArray, lines: FloatArray) -> float:
@@ -94,4 +100,5 @@ def _slope(doublings: FloatArray, relative_db: FloatArray, lines: FloatArray) ->
 
 
 _TINY = 1e-300
+"""Lower limit of an amplitude, so that its logarithm is finite."""
 _ALL: Band = (0.0, np.inf)

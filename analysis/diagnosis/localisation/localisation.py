@@ -83,8 +83,8 @@ def possible_entries(
 ) -> tuple[Entry, ...]:
     """Entries at which a mismatch may enter the model. frequency_hz: (lines,). position: whether the position's
     channels are compared beside the response's."""
-    seen = axis_transfer(model, recording.sample_rate_hz, frequency_hz)
-    forces = np.concatenate([seen.response, seen.position], axis=1) if position else seen.response
+    transfer = axis_transfer(model, recording.sample_rate_hz, frequency_hz)
+    forces = np.concatenate([transfer.response, transfer.position], axis=1) if position else transfer.response
     axes = tuple(axis_letter(channel, recording.command.channels) for channel in recording.command.channels)
     p, channels = model.outputs, forces.shape[1]
     unit = np.eye(channels, dtype=np.complex128)[None]

@@ -15,12 +15,12 @@ _FORCES = "drives, mechanism and a hand enter so, and so does timing, which shif
 
 def localisation_sentences(local: Localisation) -> tuple[str, ...]:
     """Sentences about the residual of the re-tuned model: where it enters, and the states that it depends on."""
-    said = (entry_sentence(local.entry), states_sentence(local.states.get("retuned", ())))
-    return tuple(sentence for sentence in said if sentence)
+    texts = (entry_sentence(local.entry), states_sentence(local.states.get("retuned", ())))
+    return tuple(sentence for sentence in texts if sentence)
 
 
 def entry_sentence(entry: EntryPoint | None) -> str:
-    """Where the mismatch enters; empty with too few lines of enough power."""
+    """Sentence on the place where the mismatch enters; empty with too few lines of enough power."""
     if entry is None or not entry.ranking or entry.lines < ENTRY_LEAST_LINES:
         return ""
     best = entry.ranking[0]

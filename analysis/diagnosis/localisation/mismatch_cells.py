@@ -96,7 +96,7 @@ def mismatch_cells(
 
     Raises ValueError where a prediction has another shape than the recording.
     """
-    seen = _observations(recording, prediction, floor)
+    observations = _observations(recording, prediction, floor)
     if not floor.known:
         return ()
     counted = np.ones(len(recording), dtype=np.bool_) if used is None else used
@@ -104,7 +104,7 @@ def mismatch_cells(
         raise ValueError(f"the mask of used samples must have shape ({len(recording)},), not {counted.shape}")
     allowed = margin or Margin()
     cells: list[MismatchCell] = []
-    for channels, observation in seen:
+    for channels, observation in observations:
         groups: dict[tuple[str, Band, float], list[ResidualLines]] = {}
         for lines in residual_lines(recording, observation, counted):
             groups.setdefault((lines.input, lines.band_hz, lines.amplitude), []).append(lines)
@@ -128,9 +128,9 @@ def _observations(
     ]
 
 
-def _cell(group: Sequence[ResidualLines], k: int, name: str, seen: Observation, margin: Margin) -> MismatchCell:
+def _cell(group: Sequence[ResidualLines], k: int, name: str, observation: Observation, margin: Margin) -> MismatchCell:
     first = group[0]
-    quantity = seen.quantities[k]
+    quantity = observation.quantities[k]
     allowed = margin.of(name, quantity, first.input, first.band_hz)
     seconds = np.array([part.seconds for part in group])
     lines = np.array([part.lines for part in group])
@@ -139,7 +139,7 @@ def _cell(group: Sequence[ResidualLines], k: int, name: str, seen: Observation, 
         for what in ("residual", "noise", "signal")
     )
     ratio = float(np.average([part.whitened[k] for part in group], weights=lines))
-    loud, freedom = sum(float(part.signal_to_noise[k]) for part in group), max(float(seen.noise.freedom[k]), 1.0)
+    loud, freedom = sum(float(part.signal_to_noise[k]) for part in group), max(float(observation.noise.freedom[k]), 1.0)
     p_value = float(noncentral_f_sf(ratio, lines.sum(), freedom, 2 * allowed**2 * loud))
     return MismatchCell(
         name, quantity, first.input, first.band_hz, first.amplitude,

@@ -24,7 +24,7 @@ STRETCHES = 16
 @dataclass(frozen=True, slots=True, eq=False)
 class Maps:
     cells: Mapping[str, Cells]
-    """By "before", "retuned", "after"."""
+    """The map of each stage; keys "before", "retuned", "after"."""
 
     @property
     def rows(self) -> tuple[Mismatch, ...]:
@@ -44,17 +44,17 @@ def mismatch_maps(
     learned: CleanFloor | None = None,
     map_: Mapper = map,
 ) -> Maps:
-    """Maps of all stages. stages: see `Explanation.stages`. learned: the mismatch of clean recordings, which does not
-    count; nor does the error of the last stage on held-out samples."""
+    """Maps of all stages. stages: fits by name ("before", "retuned", "after"). learned: the mismatch of clean
+    recordings, which does not count; nor does the error of the last stage on held-out samples."""
     # Stages with the same fit are tested once.
     fits = list({id(fitted): fitted for fitted in stages.values()}.values())
 
-    def looked_at(number: int) -> Cells:
+    def make_map(number: int) -> Cells:
         if number == len(fits):
             return cells_of(measure, stages["after"], floors, held_out=True)
         return cells_of(measure, fits[number], floors, learned)
 
-    found: list[Cells] = list(map_(looked_at, range(len(fits) + 1)))  # type: ignore[arg-type]
+    found: list[Cells] = list(map_(make_map, range(len(fits) + 1)))  # type: ignore[arg-type]
     error, cells = model_error(found[-1]), {id(fitted): own for fitted, own in zip(fits, found, strict=False)}
     return Maps({stage: adjust_for_model_error(cells[id(fitted)], error) for stage, fitted in stages.items()})
 
@@ -89,8 +89,8 @@ def _p_value_of_noise(measure: ErrorMeasure, fitted: Fitted, channel: int) -> fl
     if len(known) < len(over) or len(known) < 2 or np.ptp(known) == 0:
         return 0.0 if not known.size or known.mean() > 1 else 1.0
     score = (known.mean() - 1.0) / (known.std(ddof=1) / np.sqrt(len(known)))
-    in_common, in_sum = float(stdtr(len(known) - 1, -score)), float(chdtrc(len(known), known.sum()))
-    return min(2 * min(in_common, in_sum), 1.0)
+    p_of_mean, p_of_sum = float(stdtr(len(known) - 1, -score)), float(chdtrc(len(known), known.sum()))
+    return min(2 * min(p_of_mean, p_of_sum), 1.0)
 
 
 def cells_of(

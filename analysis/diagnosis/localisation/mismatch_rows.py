@@ -10,6 +10,7 @@ from analysis.diagnosis.localisation.state_regions import StateRegion
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 
 MOST_ROWS = 40
+"""Most rows of the table of mismatches."""
 
 
 @dataclass(frozen=True, slots=True)

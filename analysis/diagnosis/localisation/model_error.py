@@ -31,7 +31,7 @@ class _HeldOutShare:
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelError:
     held: Mapping[tuple[str, str], tuple[_HeldOutShare, ...]]
-    """By channel and quantity."""
+    """Held-out shares by (channel, quantity)."""
 
     def of(self, cell: MismatchCell) -> tuple[float, int]:
         """Expected square of the cell's share, from other cells near it, and their number; 0 and 0 without any."""
@@ -45,7 +45,7 @@ class ModelError:
         return (float(np.median(near) / np.log(2)), len(near)) if near else (0.0, 0)
 
     def typical(self) -> Mapping[tuple[str, str], float]:
-        """By channel and quantity: the median share over all its cells."""
+        """Median share over all cells, by (channel, quantity)."""
         return {channel: float(np.median([held.share for held in all_])) for channel, all_ in self.held.items()}
 
 

@@ -16,6 +16,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 _WINDOW_S = 1.0
+"""Length of a window where nothing is periodic."""
 _DRIVEN_IN_BAND = 1e-4
 """Share of the strongest band's power of the command below which a band is not driven."""
 _DRIVEN_IN_WINDOW = 1e-2
@@ -67,12 +68,12 @@ _LEAST_AMPLITUDE = 0.1
 driven depends on fractions of a degree of misalignment, so the strongest is the reference."""
 
 
-def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[ResidualLines]:
+def residual_lines(recording: Recording, observation: Observation, used: Mask) -> list[ResidualLines]:
     """Residual power by segment and band. used: (n,), the samples that count. Segments without a complete period or
     window are left out."""
-    whole = used & np.isfinite(seen.measured).all(axis=1) & np.isfinite(seen.predicted).all(axis=1)
+    whole = used & np.isfinite(observation.measured).all(axis=1) & np.isfinite(observation.predicted).all(axis=1)
     periods = {period.index: period for period in settled_periods(recording)}
-    left = seen.measured - seen.predicted
+    left = observation.measured - observation.predicted
     found: list[ResidualLines] = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
         if segment.kind == "rest":
@@ -80,21 +81,25 @@ def residual_lines(recording: Recording, seen: Observation, used: Mask) -> list[
         if index in periods:
             starts = tuple(s for s in periods[index].starts if whole[s : s + segment.period].all())
             if starts:
-                found += _of_periods(recording, seen, left, Periods(index, segment, starts, periods[index].settled))
+                found += _of_periods(
+                    recording, observation, left, Periods(index, segment, starts, periods[index].settled)
+                )
         else:
-            found += _of_windows(recording, seen, left, (segment, whole))
+            found += _of_windows(recording, observation, left, (segment, whole))
     return found
 
 
-def _of_periods(recording: Recording, seen: Observation, left: FloatArray, periods: Periods) -> list[ResidualLines]:
+def _of_periods(
+    recording: Recording, observation: Observation, left: FloatArray, periods: Periods
+) -> list[ResidualLines]:
     excitation = mean_spectrum(instrument_signal(recording), periods)
     driven = detection_lines(excitation, hold_length(instrument_signal(recording)))
     if driven is None:
         return []
     lines_hz = periods.frequency_hz(recording.sample_rate_hz)
-    response = np.abs(mean_spectrum(seen.measured, periods)) ** 2
+    response = np.abs(mean_spectrum(observation.measured, periods)) ** 2
     residual = np.abs(mean_spectrum(left, periods)) ** 2
-    noise = _noise_power(seen, lines_hz, periods.count) / periods.length
+    noise = _noise_power(observation, lines_hz, periods.count) / periods.length
     inputs = "+".join(find_driven_inputs(np.sum(np.abs(excitation) ** 2, axis=0), recording.command.channels))
     lowest, highest = (float(line) for line in lines_hz[driven.driven][[0, -1]])
     inside = (lines_hz >= lowest) & (lines_hz <= highest)
@@ -104,12 +109,12 @@ def _of_periods(recording: Recording, seen: Observation, left: FloatArray, perio
         chosen = inside & lines_in_band(lines_hz, band)
         if (chosen & driven.driven).any():
             where = (inputs, periods.segment.amplitude, band, seconds, float(chosen.sum()))
-            found.append(_sum_lines(where, residual[chosen], noise[chosen], response[chosen], seen.quantities))
+            found.append(_sum_lines(where, residual[chosen], noise[chosen], response[chosen], observation.quantities))
     return found
 
 
 def _of_windows(
-    recording: Recording, seen: Observation, left: FloatArray, where_used: tuple[Segment, Mask]
+    recording: Recording, observation: Observation, left: FloatArray, where_used: tuple[Segment, Mask]
 ) -> list[ResidualLines]:
     segment, whole = where_used
     length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
@@ -121,9 +126,9 @@ def _of_windows(
         return []
     lines_hz: FloatArray = np.arange(1.0, (length + 1) // 2) * (recording.sample_rate_hz / length)
     excitation = np.sum(_window_power(instrument_signal(recording), starts, length), axis=2)
-    response = _window_power(seen.measured, starts, length)
+    response = _window_power(observation.measured, starts, length)
     residual = _window_power(left, starts, length)
-    noise = np.broadcast_to(_noise_power(seen, lines_hz, 1) / length, response.shape)
+    noise = np.broadcast_to(_noise_power(observation, lines_hz, 1) / length, response.shape)
     inputs = "+".join(find_driven_inputs(command.var(axis=0), recording.command.channels))
     by_band = [
         (band, lines_in_band(lines_hz, band)) for band in octaves_between(2 * float(lines_hz[0]), float(lines_hz[-1]))
@@ -145,7 +150,7 @@ def _of_windows(
             max(independent, 1.0),
         )
         flat = [power_of[chosen].reshape(windows * width, -1) for power_of in (residual, noise, response)]
-        per_window = _sum_lines(where, flat[0], flat[1], flat[2], seen.quantities)
+        per_window = _sum_lines(where, flat[0], flat[1], flat[2], observation.quantities)
         found.append(_per_window(per_window, windows))
     return found
 
@@ -157,11 +162,13 @@ def _window_power(samples: FloatArray, starts: Sequence[int], length: int) -> Fl
     return np.abs(spectra((periods - periods.mean(axis=1, keepdims=True)) * hann[:, None])) ** 2
 
 
-def _noise_power(seen: Observation, lines_hz: FloatArray, periods: int) -> FloatArray:
+def _noise_power(observation: Observation, lines_hz: FloatArray, periods: int) -> FloatArray:
     """Noise power times length, of the mean of `periods` periods; the repeating part of rounding does not average
     out."""
-    density = np.stack([np.interp(lines_hz, seen.noise_hz, channel) for channel in seen.noise.density.T], axis=1)
-    return (density - seen.noise.rounding) / periods + seen.noise.rounding
+    density = np.stack(
+        [np.interp(lines_hz, observation.noise_hz, channel) for channel in observation.noise.density.T], axis=1
+    )
+    return (density - observation.noise.rounding) / periods + observation.noise.rounding
 
 
 def _sum_lines(

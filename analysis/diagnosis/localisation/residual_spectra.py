@@ -17,7 +17,9 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 _WINDOW_S = 2.0
+"""Length of a window where nothing is periodic."""
 _LEAST_AMPLITUDE = 0.1
+"""Least amplitude with which a channel counts, relative to the strongest channel of its signal."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,9 +16,11 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
 _SMOOTHED_LINES = 9
+"""Lines over which the spread between periods is averaged."""
 _CLEAN = 1e-5
 """Share of a command's strongest line below which its content on a silent line is negligible."""
 _LEAST_INDEPENDENCE = 1e-3
+"""Least ratio of the smallest to the largest singular value of the inputs for which a line determines a response."""
 _INTERPOLATED = 0.1
 """Relative error of a response that is interpolated between driven lines."""
 

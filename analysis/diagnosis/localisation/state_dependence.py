@@ -19,6 +19,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
 _SEED = 20
+"""Seed of the permutations: the same recording gives the same result."""
 _DRIVEN = 0.02
 """Least rms of an axis's command, relative to the strongest segment, for the axis to count as driven."""
 

@@ -13,7 +13,9 @@ from equalizer.signals.signal import FloatArray
 
 StateKind = Literal["position", "velocity", "command", "response", "time"]
 _BINS = 12
+"""Bins of a state, with equally many samples each."""
 PERMUTATIONS = 60
+"""Permutations of blocks; the p-value is that of a gamma distribution fitted to them."""
 _CONCENTRATED = 1.5
 """Least ratio of a bin's mean square to the expected one, for the bin to belong to a region."""
 _LEAST_SHARE = 0.05
@@ -164,8 +166,8 @@ def _region(state: State, values: FloatArray, bins: IntArray, asked: _Sample) ->
 def _unevenness(seen: FloatArray, expected: FloatArray) -> float:
     """Chi-squared statistic of bin powers against the expected ones, over the total power."""
     whole = float(expected.sum())
-    told = expected > _LEAST_EXPECTED * whole / len(expected)
-    return float(np.sum((seen - expected)[told] ** 2 / expected[told])) / whole if whole > _TINY else 0.0
+    populated = expected > _LEAST_EXPECTED * whole / len(expected)
+    return float(np.sum((seen - expected)[populated] ** 2 / expected[populated])) / whole if whole > _TINY else 0.0
 
 
 def _within_stratum(strata: IntArray) -> FloatArray:

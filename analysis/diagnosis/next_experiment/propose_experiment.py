@@ -42,8 +42,8 @@ class Proposal:
 
 
 def propose_experiment(context: SearchContext, found: Explanation) -> Proposal | None:
-    """For the first effect of whose rivals some recording would tell one apart, else for the last that has rivals;
-    None where no rival is as good as what is named."""
+    """Propose recordings for the first effect that some recording would distinguish from one of its rivals, else for
+    the last that has rivals; None where no rival is as good as the named effects."""
     proposal = None
     for fitted_candidates in found.rounds[: len(found.steps)]:
         rivals = _rivals(fitted_candidates)

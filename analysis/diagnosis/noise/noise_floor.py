@@ -44,8 +44,8 @@ class NoiseFloor:
 
 
 def noise_floor(recording: Recording) -> NoiseFloor:
-    """From repeated periods; else from rest; else from the lines above the driven band, assumed to be white; else `how`
-    is "unknown" and every rms NaN."""
+    """Estimate the noise from repeated periods; else from rest; else from the lines above the driven band, assumed to
+    be white; else `how` is "unknown" and every rms NaN."""
     periods = tuple(period for period in settled_periods(recording) if period.count > 1)
     if periods:
         return _from_repeats(recording, periods)

@@ -16,6 +16,7 @@ _TRANSIENT_RATIO = 2.0
 """Ratio of a period's difference from the last one, first third over last third (energy), above which it has not
 settled."""
 _SHORTEST = 8
+"""Shortest period in samples: below it there are too few lines."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,13 @@ from equalizer.signals.signal import FloatArray
 _LEAST_SAMPLES = 8
 """Least samples of a window: recordings at less than 32 Hz have no window."""
 _WINDOW_S = 0.25
+"""Length of a window at rest."""
 _SILENT = 1e-4
 """Share of the strongest smoothed power of the command below which nothing is driven."""
 _CLEAR = 1.3
 """Ratio to the highest driven line above which leakage of the windows is negligible."""
 _LEAST_LINES = 16
+"""Fewest lines above the driven band from which the noise is estimated."""
 _DIFFERENCE_GAIN, _DIFFERENCE_LOSS = 20.0, 2.31
 """Third differences of white noise: gain of variance, and loss of degrees of freedom by correlation."""
 

@@ -19,6 +19,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _SMOOTHED_LINES = 9
+"""Lines over which the variance between periods is averaged."""
 _ALIKE = 1e-4
 """Significance level of the test for equal noise."""
 _STEPS_MOVED = 1.2

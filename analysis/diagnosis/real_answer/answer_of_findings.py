@@ -23,6 +23,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _REACH = 1.96
+"""Standard errors of half a 95 % interval (normal distribution)."""
 
 
 def answer_of_findings(

@@ -8,6 +8,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from analysis.diagnosis.document import Candidate, Errors
+from equalizer.signals.listed_problems import ListedProblemsError
 
 FORMAT, VERSION = "hapteq-real-answer", 1
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -15,12 +16,8 @@ STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 Outcome = Literal["no_mismatch", "parameters", "explained", "partly_explained", "unexplained", "refused"]
 
 
-class RealAnswerError(ValueError):
+class RealAnswerError(ListedProblemsError):
     """A document that is no such answer. `problems`: one sentence each."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -51,14 +51,14 @@ class _Lesson:
 @dataclass(frozen=True, slots=True, eq=False)
 class LearnedError:
     floor: CleanFloor
-    colour: WhiteningFilter
+    whitening: WhiteningFilter
     share: FloatArray
     """(c,): rms of the whitened residual over the signal's; see `_signal`."""
     references: ReferenceRecordings
 
     def noise_measure(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
         """The error measure of the recordings to diagnose, with this residual as coloured noise."""
-        return whiten_measure(measure, self.colour, self.share * _signal(measure, measure.residuals(model, ())))
+        return whiten_measure(measure, self.whitening, self.share * _signal(measure, measure.residuals(model, ())))
 
 
 def learn_model_error(
@@ -101,23 +101,23 @@ def require_alike(learned_by: str, error: str) -> None:
 
 def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> LearnedError:
     residuals = [each for lesson in lessons for each in lesson.residuals]
-    colour = whitening_filter(residuals, np.min([lesson.measure.noise for lesson in lessons], axis=0))
+    whitening = whitening_filter(residuals, np.min([lesson.measure.noise for lesson in lessons], axis=0))
     shares = [
-        _rms([colour.apply(residual) for residual in lesson.residuals])
+        _rms([whitening.apply(residual) for residual in lesson.residuals])
         / _signal(lesson.measure, lesson.retuned.fitted.residuals)
         for lesson in lessons
     ]
     share = np.max(shares, axis=0)
     learned = [
         reference_recording(
-            whiten_measure(count_as_noise(lesson.measure, floor), colour, share * lesson.signal),
+            whiten_measure(count_as_noise(lesson.measure, floor), whitening, share * lesson.signal),
             lesson.tuning,
             lesson.retuned.fitted.deviations,
             map_,
         )
         for lesson in lessons
     ]
-    return LearnedError(floor, colour, share, ReferenceRecordings(tuple(learned), floor.beyond))
+    return LearnedError(floor, whitening, share, ReferenceRecordings(tuple(learned), floor.beyond))
 
 
 def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:

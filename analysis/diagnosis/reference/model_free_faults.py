@@ -31,8 +31,8 @@ SAME = 1e-9
 def find_sensor_faults(
     recordings: Sequence[Recording], clean: Sequence[Recording], effects: Sequence[Effect]
 ) -> tuple[Hypothesis, ...]:
-    """At most one hypothesis, for rounded readings also repeat and have a largest value. effects: those that may be
-    named."""
+    """Find faulty readings: at most one hypothesis, because rounded readings also repeat and have a largest value.
+    effects: those that may be named."""
     known = {effect.name: effect for effect in effects}
     new = _readings(recordings)
     references = [

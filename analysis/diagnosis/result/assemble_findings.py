@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from analysis.diagnosis.localisation.clean_floor import CleanFloor, learned_sent
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, whole_mismatch
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
-from analysis.diagnosis.next_experiment.propose_experiment import Proposal, propose_experiment
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.error_table import channel_errors, errors_of, held_out_stands_still
 from analysis.diagnosis.result.findings import Findings, TimeSeries
@@ -36,6 +36,9 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
+if TYPE_CHECKING:
+    from analysis.diagnosis.next_experiment.propose_experiment import Proposal
+
 
 def assemble_findings(
     result: SearchResult, floors: tuple[NoiseFloor, ...], names: Sequence[str], learned: CleanFloor
@@ -45,7 +48,7 @@ def assemble_findings(
     context, found, judged = result.context, result.found, result.judgement
     measure, tuning = context.whole, context.tuning
     recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.placed_effects()
-    said, (improved, retuned) = labels_of(recording, tuning.model), _models(result, recording)
+    labels, (improved, retuned) = labels_of(recording, tuning.model), _models(result, recording)
     channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(result)
     maps = mismatch_maps(measure, found.stages, floors, learned, context.map_)
     time_series = _time_series(measure, found, names)
@@ -74,7 +77,7 @@ def assemble_findings(
         local=examined.local,
         floor=floors[0],
         tuning=tuning,
-        axes=tuple(axis_letter(name, said.inputs) for name in said.inputs),
+        axes=tuple(axis_letter(name, labels.inputs) for name in labels.inputs),
         proposal=proposal,
         split_s=_split_s(measure),
         own_errors=errors[: len(tuning.names)] * tuning.deviation,
@@ -84,8 +87,8 @@ def assemble_findings(
 def _models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel, MechanicalModel]:
     """The re-tuned models with the named effects and without, driven by the commands as they were recorded."""
     tuning, found = result.context.tuning, result.found
-    fitted, said = found.after.fitted, labels_of(recording, tuning.model)
-    effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed_effects(), said.inputs, said.outputs))
+    fitted, labels = found.after.fitted, labels_of(recording, tuning.model)
+    effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed_effects(), labels.inputs, labels.outputs))
     with_them = replace(tuning.tune(fitted.deviations), effects=effects)
     return as_recorded(with_them, recording), as_recorded(tuning.tune(found.retuned.fitted.deviations), recording)
 
@@ -103,8 +106,8 @@ def _remarks(
     first: Sequence[str], time_series: Sequence[TimeSeries], tuning: Tuning, floors: tuple[NoiseFloor, ...]
 ) -> tuple[str, ...]:
     of_noise = (remark for floor in floors for remark in floor.remarks)
-    said = (*first, *unit_sentences(time_series), constant_sentence(tuning.model), *of_noise)
-    return tuple(dict.fromkeys(filter(None, said)))
+    texts = (*first, *unit_sentences(time_series), constant_sentence(tuning.model), *of_noise)
+    return tuple(dict.fromkeys(filter(None, texts)))
 
 
 def _split_s(measure: ErrorMeasure) -> dict[str, float]:
@@ -131,19 +134,19 @@ def _standard_errors(result: SearchResult) -> FloatArray:
 
 
 def _document(
-    result: SearchResult, errors: FloatArray, examined: tuple[Maps, Localisation], proposal: Proposal | None
+    result: SearchResult, errors: FloatArray, examined: tuple[Maps, Localisation], proposal: "Proposal | None"
 ) -> Diagnosis:
     found, judged = result.found, result.judgement
     measure, tuning, fitted = result.context.whole, result.context.tuning, found.after.fitted
     maps, local = examined
-    said = labels_of(measure.records[0].recording, tuning.model)
+    labels = labels_of(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judged.verdict,
         mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
         or (
             () if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.score, found.before.fitted)
         ),
-        effects=_effects_with_gains(result, errors[len(tuning.names) :], said) if judged.named else (),
+        effects=_effects_with_gains(result, errors[len(tuning.names) :], labels) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
@@ -156,19 +159,24 @@ def _document(
     )
 
 
-def _effects_with_gains(result: SearchResult, errors: FloatArray, said: Labels) -> tuple[NamedEffect, ...]:
+def _effects_with_gains(result: SearchResult, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
     """The named effects, with their gains on held-out data where samples were compared."""
     context, found = result.context, result.found
-    effects = named_effects(found, errors, said)
+    effects = named_effects(found, errors, labels)
     if found.statistic is not None or len(found.steps) != len(effects):
         return effects
     between = [context.with_test_score(step) for step in found.steps[:-1]]
     return with_gains(effects, context.whole, (found.plain, *between, found.after))
 
 
-def _proposal(context: SearchContext, found: Explanation, judged: Judgement) -> Proposal | None:
-    foretold = judged.named and context.whole.name == "free simulation" and found.statistic is None
-    return propose_experiment(context, found) if foretold else None
+def _proposal(context: SearchContext, found: Explanation, judged: Judgement) -> "Proposal | None":
+    """The next recording; None where no effect is named, or where recordings cannot be predicted by simulation."""
+    if not judged.named or context.whole.name != "free simulation" or found.statistic is not None:
+        return None
+    # Imported here: only named effects have rivals that a further recording could separate.
+    from analysis.diagnosis.next_experiment.propose_experiment import propose_experiment
+
+    return propose_experiment(context, found)
 
 
 def channel_names(recording: Recording, count: int) -> tuple[str, ...]:

@@ -94,9 +94,9 @@ def refinement_sentence(effect: NamedEffect) -> str:
     names = [noun_of(rival.effect) for rival in effect.rivals if rival.why_not == REFINED]
     if not names:
         return ""
-    said = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+    text = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
     hold = "refine it, and bring" if len(names) > 1 else "refines it, and brings"
-    return f"{capitalise(said)} {hold} nothing on held-out data."
+    return f"{capitalise(text)} {hold} nothing on held-out data."
 
 
 def _class_names(effect: NamedEffect) -> tuple[str, ...]:
@@ -120,19 +120,19 @@ def candidate_title(candidate: Candidate, device: Device | None = None) -> str:
 def candidate_numbers(candidate: Candidate, device: Device | None = None) -> str:
     """device: None = not known, and so are the units: bare SI numbers."""
     if device is None:
-        said = ", ".join(
+        text = ", ".join(
             f"{name.replace('_', ' ')} {value:.3g}".replace("e-0", "e-") for name, value in candidate.parameters.items()
         )
-        return f"{said} (SI)" if said else ""
+        return f"{text} (SI)" if text else ""
     units = {name: unit_of(candidate.effect, name, device.system) for name in candidate.parameters}
     return numbers_text(candidate.effect, {k: Estimate(v, units[k]) for k, v in candidate.parameters.items()})
 
 
 def candidate_sentences(diagnosis: Diagnosis, device: Device | None = None) -> tuple[str, ...]:
     """A sentence for each of the best few candidates; without the first where the verdict's sentence says it."""
-    said = 1 if best_candidate_sentence(diagnosis, device) else 0
+    already = 1 if best_candidate_sentence(diagnosis, device) else 0
     return tuple(
-        f"Not confirmed: {_with_gain(candidate, device)}" for candidate in diagnosis.candidates[said:SENTENCES]
+        f"Not confirmed: {_with_gain(candidate, device)}" for candidate in diagnosis.candidates[already:SENTENCES]
     )
 
 

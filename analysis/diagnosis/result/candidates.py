@@ -21,6 +21,7 @@ from equalizer.effects.placing import axis_letter
 _NAME, _FREE, _OWN_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
 _NUMBER = re.compile(r"(?<![A-Za-z_\d])\d[\d.]*(?:[eE][+-]?\d+)?")
 MOST = 6
+"""Most candidates that a diagnosis lists."""
 REFINING = {
     "drifting_friction": ("coulomb_friction",),
     "condition_dependent_friction": ("coulomb_friction",),
@@ -157,7 +158,7 @@ def _rank(weighed: JudgedLaw) -> int:
 def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...], in_samples: bool = False) -> tuple[str, ...]:
     """Remarks on the first model's linear terms beside mass, damping and stiffness; channels: of the commands.
     in_samples: samples are counted as time."""
-    said = []
+    texts = []
     for channel, balance in zip(channels, balances, strict=False):
         beside, motion = balance.search.regression.beside, balance.search.regression.motions[0]
         laws = [law.effect for law in linear_laws(balance)]
@@ -169,11 +170,11 @@ def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...], in_sa
             parts.append(f"the motion of {conjoin(others)}")
         if parts:
             where = f" along {channel}" if len(channels) > 1 else ""
-            said.append(
+            texts.append(
                 f"Beside mass, damping and stiffness the first model holds{where} {conjoin(parts)}; what is linear is "
                 "no missing physics."
             )
-    return tuple(said)
+    return tuple(texts)
 
 
 def balance_errors(
@@ -212,12 +213,12 @@ def _with_class(effect: NamedEffect, found: tuple[JudgedLaw, float] | None) -> N
         late = effect.effect in LATE
         return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *LATE)))) if late else effect
     weighed, share = found
-    said = {rival.effect for rival in effect.rivals}
+    known_rivals = {rival.effect for rival in effect.rivals}
     others = tuple(name for name in weighed.alike if name == weighed.stands_for or not refines(name, effect.effect))
     rivals = tuple(
         Rival(name, 0.0, name in others, ALIKE if name in others else REFINED)
         for name in weighed.alike
-        if name not in said
+        if name not in known_rivals
     )
     own = (effect.effect,) if weighed.formula is None else (effect.effect, weighed.law.effect)
     alike = (*own, *others) if len(own) + len(others) > 1 else ()

@@ -75,10 +75,10 @@ def fall_text(errors: Errors, first: tuple[str, str], last: tuple[str, str], how
     )
 
 
-def one_error(said: str, error: float | None, errors: Errors, how: str = "") -> str:
+def one_error(text: str, error: float | None, errors: Errors, how: str = "") -> str:
     if error is None:
         return "its error on held-out data is not known"
-    return f"{said}, its error on held-out data is {error_of_signal(error)}{_noise(errors, error, how)}"
+    return f"{text}, its error on held-out data is {error_of_signal(error)}{_noise(errors, error, how)}"
 
 
 def _noise(errors: Errors, error: float, how: str) -> str:

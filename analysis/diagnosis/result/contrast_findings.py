@@ -22,6 +22,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 MOST = 6
+"""Most candidates that a diagnosis lists."""
 BESIDE = (
     "The recordings were compared with the clean ones by a model that was fitted to both at once and holds all "
     "laws that they ask for: a fault is what the clean ones lack. It counts beyond {:.3g} times what it would gain "

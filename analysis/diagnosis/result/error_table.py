@@ -10,7 +10,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.settings import SAME_TO_READERS, SEALED_SURPRISE, STILL_SHARE
+from analysis.diagnosis.settings import HELD_OUT_SURPRISE, SAME_TO_READERS, STILL_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
@@ -25,7 +25,7 @@ def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
 
 
 def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, Mapping[str, float]]:
-    """By stage and channel: rms over the test samples in units of the noise."""
+    """Rms errors over the test samples, in units of the noise, by stage and channel."""
     stages = {"before": found.before, "retuned": found.retuned, "after": found.after}
     return {stage: dict(zip(names, candidate.score.test.tolist(), strict=True)) for stage, candidate in stages.items()}
 
@@ -69,7 +69,7 @@ def held_out_stands_still(records: Sequence[Observed], noise: FloatArray) -> boo
     held = _mean_power(records, [each.test for each in records])
     known = _mean_power(records, [each.fit | each.choose for each in records])
     # A channel that contains only noise is never below a share of that in the fitted samples.
-    still = np.fmax(STILL_SHARE * known, (SEALED_SURPRISE * noise) ** 2)
+    still = np.fmax(STILL_SHARE * known, (HELD_OUT_SURPRISE * noise) ** 2)
     return bool((STILL_SHARE * known > noise**2).any() and (held <= still).all())
 
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.diagnosis.next_experiment.propose_experiment import Proposal
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.curves.state_maps import StateMaps
 from analysis.diagnosis.search.explain import Explanation
@@ -17,6 +17,9 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summarised, Summary
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.next_experiment.propose_experiment import Proposal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +70,7 @@ class BlackBox:
     kind: str
     numbers: int
     test: float
-    """Its error on the test samples, as in `document.Errors`."""
+    """Error on the test samples, as in `document.Errors`."""
     physics: float
     """The same of the named effects."""
 
@@ -113,7 +116,8 @@ class Findings(Summarised):
     noise_rms: Mapping[str, float]
     """Noise rms by channel, SI."""
     channel_errors: Mapping[str, Mapping[str, float]]
-    """By "before", "retuned", "after", then by channel: rms over the test samples in units of the noise."""
+    """Rms error over the test samples in units of the noise: by stage ("before", "retuned", "after"), then by
+    channel."""
     mismatch: tuple[Mismatch, ...]
     """All tested cells, not only the significant ones (see p_value and share)."""
     signatures: tuple[Signature, ...]
@@ -121,7 +125,7 @@ class Findings(Summarised):
     remarks: tuple[str, ...]
     """Remarks as sentences: assumptions, weaknesses, implausible results."""
     maps: Mapping[str, tuple[MismatchCell, ...]] = field(default_factory=dict)
-    """By "before", "retuned", "after": every cell of the map, in units of the noise."""
+    """Every cell of the mismatch map, in units of the noise, by stage ("before", "retuned", "after")."""
     local: Localisation = field(default_factory=Localisation)
     """Localisation of the mismatch: in which states, through which input, and of which kind."""
     fitted: bool = False
@@ -135,7 +139,7 @@ class Findings(Summarised):
     deviations."""
     axes: tuple[str, ...] = ()
     """Displayed names of the driven axes; empty = x, y, z."""
-    proposal: Proposal | None = None
+    proposal: "Proposal | None" = None
     """The next recording proposed, where rivals are as good as what is named."""
     reached: tuple[BalanceErrors, ...] = ()
     """Force balance per axis; empty where none was computed."""

@@ -5,11 +5,11 @@ import math
 from analysis.diagnosis.document import Diagnosis
 
 IMPACTS_COMPARED = (
-    "The device rattles, and no simulation predicts the course of blows for long: two that differ by a billionth part "
-    "soon. Instead of samples, the power of each channel in each half octave of each segment was compared. The errors "
-    "are root-mean-square logarithms of the ratio of amplitudes, and what two simulations of the same play differ by, "
-    "at least 5 %, stands where the noise stands otherwise. No black box was fitted beside: it would have to predict "
-    "the course."
+    "The device rattles, and no simulation predicts a sequence of impacts for long: two that differ by a billionth "
+    "soon part. Instead of samples, the power of each channel in each half octave of each segment was compared. The "
+    "errors are root-mean-square logarithms of the ratio of amplitudes, and what two simulations of the same play "
+    "differ by, at least 5 %, stands where the noise stands otherwise. No black box was fitted beside: it would have "
+    "to predict each impact."
 )
 BY_CHANCE = "what chance makes of it"
 BY_NOISE = "the noise"
@@ -21,11 +21,11 @@ def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
     rest = "" if diagnosis.verdict == "explained" else ", but that is not all"
     off = [errors.retuned, errors.after, errors.noise]
     factors = [f"{math.exp(ratio):.3g}" for ratio in off if ratio is not None]
-    said = "how far its amplitudes are off is not known"
+    text = "how far its amplitudes are off is not known"
     if len(factors) == len(off):
         without, with_it, chance = factors
-        said = (
+        text = (
             f"how strong they are, can: by half octaves, amplitudes are off by a factor of {without} without it and "
             f"of {with_it} with it, and chance alone makes {chance} of it"
         )
-    return f"Missing in the model: {named}{rest}. Its blows cannot be predicted one by one; {said}."
+    return f"Missing in the model: {named}{rest}. Its impacts cannot be predicted one by one; {text}."

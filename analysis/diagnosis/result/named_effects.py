@@ -60,40 +60,40 @@ def labels_of(recording: Recording, model: MechanicalModel) -> Labels:
     )
 
 
-def named_effects(found: Explanation, errors: FloatArray, said: Labels) -> tuple[NamedEffect, ...]:
+def named_effects(found: Explanation, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
     """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (numbers,), standard
     errors of the hypothesis's point."""
     whole, named, first = found.after.fitted.hypothesis, [], 0
     shares = shares_taken(found.retuned, found.steps)
     for number, claim in enumerate(whole.claims):
         size = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
-        rivals, likely = _rivals(found, number, said)
+        rivals, likely = _rivals(found, number, labels)
         named.append(
             NamedEffect(
                 effect=claim.effect.name,
                 place=place_of_effect(claim.effect),
-                axis=axis_of(claim, said),
+                axis=axis_of(claim, labels),
                 share=shares[number],
                 probability=likely,
-                parameters=_estimates(whole, number, errors, slice(first, first + size), said),
+                parameters=_estimates(whole, number, errors, slice(first, first + size), labels),
                 rivals=rivals,
-                law=law_of_claim(whole, number, axis_of(claim, said)),
+                law=law_of_claim(whole, number, axis_of(claim, labels)),
             )
         )
         first += size
     return tuple(named)
 
 
-def axis_of(claim: Claim, said: Labels) -> str | None:
+def axis_of(claim: Claim, labels: Labels) -> str | None:
     """The axis letter of an effect's site; None where all axes share the effect."""
     if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
         return None
     sensed = place_of_effect(claim.effect) == "sensor"
-    channels = said.outputs if sensed else said.inputs
+    channels = labels.outputs if sensed else labels.inputs
     return axis_letter(channels[claim.sites[0]], channels)
 
 
-def _rivals(found: Explanation, number: int, said: Labels) -> tuple[tuple[Rival, ...], float]:
+def _rivals(found: Explanation, number: int, labels: Labels) -> tuple[tuple[Rival, ...], float]:
     fitted_candidates = found.rounds[number]
     left = (
         found.after.score.worst_channel
@@ -110,7 +110,7 @@ def _rivals(found: Explanation, number: int, said: Labels) -> tuple[tuple[Rival,
             continue
         same = both_stand(best, other)
         rivals[claim.effect.name] = Rival(
-            claim.effect.name, by_name[claim.effect.name], same, _why_not(best, other, same, (said, unit))
+            claim.effect.name, by_name[claim.effect.name], same, _why_not(best, other, same, (labels, unit))
         )
         if len(rivals) == MOST_RIVALS:
             break
@@ -128,10 +128,10 @@ def _chances_of_names(fitted_candidates: Sequence[FittedCandidate], chances: Seq
 
 def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: tuple[Labels, str]) -> str:
     """Reason for not choosing a rival. words: labels of the device, and the unit of errors."""
-    said, unit = words
+    labels, unit = words
     worst, least = other.score.worst_channel, best.score.worst_channel
     claim = other.fitted.hypothesis.claims[-1]
-    axis = axis_of(claim, said)
+    axis = axis_of(claim, labels)
     where = f" ({axis})" if axis else ""
     if only_refines(other, best):
         gain = "too little" if worst < (1 - _SAME_ERROR) * least else "nothing"
@@ -144,7 +144,7 @@ def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: t
     return f"at its best{where} it leaves {worst:.3g} times {unit} in the worst channel, the named one {least:.3g}"
 
 
-def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, said: Labels) -> dict[str, Estimate]:
+def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, labels: Labels) -> dict[str, Estimate]:
     claim = whole.claims[number]
     at = reported_numbers(whole, number, whole.point)
     spread = {name: 0.0 for name in at}
@@ -155,7 +155,7 @@ def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, s
         moved[coordinate] += errors[coordinate]
         for name, value in reported_numbers(whole, number, moved).items():
             spread[name] += (value - at[name]) ** 2
-    units = _units(claim.effect, at, said)
+    units = _units(claim.effect, at, labels)
     return {
         name: Estimate(value, units.get(name) or "1", _interval(value, float(np.sqrt(spread[name]))))
         for name, value in at.items()
@@ -163,12 +163,12 @@ def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, s
     }
 
 
-def _units(effect: Effect, values: Values, said: Labels) -> dict[str, str]:
+def _units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
     if effect.law is not None:
         law = law_with_values(effect.law, values)
-        units = law_units(law, Channels(said.inputs, said.outputs, said.quantity), said.system)
+        units = law_units(law, Channels(labels.inputs, labels.outputs, labels.quantity), labels.system)
         return dict(zip(values, units, strict=True))
-    return {p.name: p.unit_in(said.system, said.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
+    return {p.name: p.unit_in(labels.system, labels.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
 
 
 def law_of_claim(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:

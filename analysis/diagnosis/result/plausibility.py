@@ -14,6 +14,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _AT_THE_EDGE = 1e-3
+"""Relative distance from a bound at which a parameter counts as being at it."""
 _LOSSES = 1e-6
 """Negative eigenvalue of a matrix that rounding may cause, over the largest."""
 
@@ -31,9 +32,9 @@ def _of_effect(placed: PlacedEffect, found: Findings) -> Iterator[str]:
     for parameter in placed.effect.parameters:
         value = values[parameter.name]
         if not parameter.fixed and _at_an_edge(value, parameter):
-            said = value_text(value, _unit(placed.effect.name, parameter.name, found))
+            text = value_text(value, _unit(placed.effect.name, parameter.name, found))
             yield (
-                f"The {parameter.name.replace('_', ' ')} of {noun} ran into the end of what was allowed ({said}): the "
+                f"The {parameter.name.replace('_', ' ')} of {noun} ran into the end of what was allowed ({text}): the "
                 "fit has found no best value for it."
             )
     if placed.effect.name == "stribeck_friction" and values["static"] < values["coulomb"]:
@@ -53,8 +54,8 @@ def _of_interval(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iterator
             continue
         low, high = estimate.ci95
         if low <= parameter.none <= high:
-            said = value_text(estimate.value, estimate.unit, estimate.ci95)
-            yield f"The interval of {noun_of(effect.effect)}, {said}, holds no effect at all: the data hardly bear it."
+            text = value_text(estimate.value, estimate.unit, estimate.ci95)
+            yield f"The interval of {noun_of(effect.effect)}, {text}, holds no effect at all: the data hardly bear it."
 
 
 def _of_model(improved: MechanicalModel) -> Iterator[str]:

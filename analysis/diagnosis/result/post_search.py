@@ -77,9 +77,12 @@ def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, 
         return ()
     shown = _most_fitted(measure)
     recording = measure.records[shown].recording
-    said, drawn = labels_of(recording, tuning.model), []
+    labels, drawn = labels_of(recording, tuning.model), []
     names = Names(
-        tuple(axis_letter(name, said.inputs) for name in said.inputs), said.outputs, said.response_unit, said.system
+        tuple(axis_letter(name, labels.inputs) for name in labels.inputs),
+        labels.outputs,
+        labels.response_unit,
+        labels.system,
     )
     complete = gather_evidence(measure, tuning, fitted)[shown].predicted
     for number in range(len(fitted.hypothesis.claims)):

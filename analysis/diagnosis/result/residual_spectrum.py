@@ -11,7 +11,9 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 
 _LENGTH = 2048
+"""Samples of a Welch window."""
 _PER_OCTAVE = 6
+"""Bins per octave of the drawn spectrum."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

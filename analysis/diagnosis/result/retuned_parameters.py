@@ -11,6 +11,7 @@ from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
 _LISTED = 4
+"""Most re-tuned parameters that a sentence lists."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,16 +54,18 @@ def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, 
 
 
 def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
-    """Beside named physics: what else was turned. fitted: the model was fitted to the same recordings first, so that no
-    calibration holds its numbers."""
+    """Sentence on the parameters that were re-tuned beside named physics. fitted: the model was fitted to the same
+    recordings first, so that no calibration holds its parameters."""
     if not moved:
         return ""
     texts = [f"{number.name} {number.size}" if fitted else number.text for number in moved[:_LISTED]]
     more = len(moved) - _LISTED
-    said = conjoin([*texts, f"{more} more"] if more > 0 else texts)
+    sentence = conjoin([*texts, f"{more} more"] if more > 0 else texts)
     if fitted:
-        return f"Fitted once more, these numbers of the first model moved by more than was left open at first: {said}."
-    return f"Re-tuned beyond the calibration's standard deviation: {said}."
+        return (
+            f"Fitted once more, these numbers of the first model moved by more than was left open at first: {sentence}."
+        )
+    return f"Re-tuned beyond the calibration's standard deviation: {sentence}."
 
 
 def doubtful_sentences(moved: Sequence[MovedNumber], fitted: bool = False) -> tuple[str, ...]:

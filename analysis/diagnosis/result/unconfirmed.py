@@ -22,7 +22,7 @@ def unconfirmed_candidates(
     relative to the gain of a black box, or, where physics gains more, to the largest gain."""
     if not found:
         return ()
-    said, most = labels_of(recording, model), max(max(each.gain for each in found), _gain_of(box), 1e-300)
+    labels, most = labels_of(recording, model), max(max(each.gain for each in found), _gain_of(box), 1e-300)
     candidates = []
     for each in found:
         number = each.claim % len(each.hypothesis.claims)
@@ -31,12 +31,12 @@ def unconfirmed_candidates(
             Candidate(
                 effect=claim.effect.name,
                 place=place_of_effect(claim.effect),
-                axis=axis_of(claim, said),
+                axis=axis_of(claim, labels),
                 parameters=reported_numbers(each.hypothesis, number, each.hypothesis.point),
                 held_out_gain=min(each.gain, 1.0),
                 share_of_black_box=min(each.gain / most, 1.0),
                 why_not=each.why_not,
-                law=law_of_claim(each.hypothesis, number, axis_of(claim, said)),
+                law=law_of_claim(each.hypothesis, number, axis_of(claim, labels)),
             )
         )
     return tuple(candidates)
@@ -54,6 +54,8 @@ def with_gains(
     named = []
     for place, effect in enumerate(effects):
         gain = held_out_gain(measure, stages[place], stages[place + 1])
-        told = None if gain is None else Estimate(gain.gain, "1", (min(gain.low, gain.gain), max(gain.high, gain.gain)))
-        named.append(replace(effect, held_out_gain=told))
+        estimate = (
+            None if gain is None else Estimate(gain.gain, "1", (min(gain.low, gain.gain), max(gain.high, gain.gain)))
+        )
+        named.append(replace(effect, held_out_gain=estimate))
     return tuple(named)

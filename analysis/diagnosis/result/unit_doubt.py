@@ -42,8 +42,8 @@ def _factor(series: TimeSeries, channel: int) -> float | None:
 def _words(factor: float) -> str:
     times = max(abs(factor), 1 / abs(factor))
     shown = f"{times:.3g}" if times < 100 else f"{times:.0f}"
-    said = [f"{shown} times {'as large' if abs(factor) > 1 else 'smaller'}"] if times >= UNIT_FACTOR else []
-    return " and ".join([*said, *(["with the other sign"] if factor < 0 else [])])
+    texts = [f"{shown} times {'as large' if abs(factor) > 1 else 'smaller'}"] if times >= UNIT_FACTOR else []
+    return " and ".join([*texts, *(["with the other sign"] if factor < 0 else [])])
 
 
 def _what(factor: float) -> str:
@@ -55,17 +55,17 @@ def constant_sentence(model: MechanicalModel) -> str:
     system = model.system
     if system.known:
         return ""
-    said = "has no unit" if system.force == "1" else f"is in {system.force}"
+    text = "has no unit" if system.force == "1" else f"is in {system.force}"
     moves = {"m": ("force", "N"), "rad": ("torque", "N m")}.get(system.length)
     if moves is None:
         moved = "has no unit" if system.length == "1" else f"is in {system.length}"
         return (
-            f"The command {said}, and the motion {moved}: forces, masses and stiffnesses are counted in these, and are "
+            f"The command {text}, and the motion {moved}: forces, masses and stiffnesses are counted in these, and are "
             "no N or kg."
         )
     per = "" if system.force == "1" else f" per {system.force}"
     return (
-        f"The command {said}, and nothing says what {moves[0]} that gives: every {moves[0]}, mass, damping and "
+        f"The command {text}, and nothing says what {moves[0]} that gives: every {moves[0]}, mass, damping and "
         f"stiffness is to be multiplied by the {moves[0]} constant ({moves[1]}{per}), which is not known; "
         "--force-constant states it."
     )

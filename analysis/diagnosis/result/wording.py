@@ -38,6 +38,7 @@ from analysis.diagnosis.unit_wording import probability_text, share_text
 from analysis.wording import capitalise, conjoin, end_sentence, p_text
 
 _PLACES_NAMED = 3
+"""Most places that a sentence lists."""
 _NOT_MORE = (
     "What is left is no more than the noise seems to be; only repeats of a drive would show that nothing else is "
     "missing."
@@ -55,8 +56,8 @@ def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = Fal
     """An effect with its numbers. signature: what it causes in the data, as the catalogue says it."""
     if effect.law is not None:
         signature = "; ".join(filter(None, (law_text(effect.law), signature)))
-    said = ", ".join(filter(None, (effect_title(effect, single), numbers_text(effect.effect, effect.parameters))))
-    return f"{capitalise(said)}: {signature}." if signature else f"{capitalise(said)}."
+    text = ", ".join(filter(None, (effect_title(effect, single), numbers_text(effect.effect, effect.parameters))))
+    return f"{capitalise(text)}: {signature}." if signature else f"{capitalise(text)}."
 
 
 def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), device: Device | None = None) -> str:
@@ -81,11 +82,11 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), de
             open_ = "" if diagnosis.verdict == "explained" else f" {_NOT_MORE}"
             return f"Missing in the model: {named}. {fall}.{open_}"
         return f"Missing in the model: {named}, but that is not all. {fall}, and a mismatch remains."
-    said = (
+    sentence = (
         "Model and device disagree, and no effect of the catalogue explains it. "
         f"{capitalise(one_error(*better_alone(errors), errors, how))}."
     )
-    return " ".join(filter(None, (said, best_candidate_sentence(diagnosis, device))))
+    return " ".join(filter(None, (sentence, best_candidate_sentence(diagnosis, device))))
 
 
 def answer_of(found: Findings) -> str:

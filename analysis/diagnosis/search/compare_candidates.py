@@ -1,4 +1,11 @@
-"""Compares candidates: the best hypotheses are fitted until they converge, and ordered by their errors."""
+"""Compares candidates: the best first fits are continued until they converge, then ordered by their errors.
+
+A Gauss-Newton fit converges about geometrically: after gains g1 and g2 of two steps the next one is predicted to gain
+g2 min(g2 / g1, 1). A fit ends when that is below a tolerance (`output_error.expected_gain`). The sensitivity to the
+model's own parameters costs one simulation each; it is kept from fit to fit, and recomputed only where a parameter has
+moved far from where it was computed. So all candidates can be compared at a small part of the cost of full fits, and
+only those within reach of the best are refined.
+"""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,24 @@
-"""Forward selection of missing effects: re-tune the model, screen candidates, fit the best, add one, repeat."""
+"""Forward selection of missing effects: re-tune the model, screen candidates, fit the best, add one, repeat.
+
+Theory of operation. A fit minimises J = (sum of e² + d'd) / N over the samples to fit: e are prediction errors in units
+of the noise, d deviations of the model's own parameters in standard deviations of their calibration (`output_error`).
+Fits are compared by the log error power, a log-likelihood in which each channel's error variance is free,
+
+    L = mean over channels of ln(rms error to fit * rms error to choose)        0 for noise alone
+
+1. The model's own parameters are re-tuned. If no channel is above the noise then, the search ends.
+2. Each effect of the catalogue estimates starting values from the missing force (`starting_hypotheses`).
+3. The gain in J of each hypothesis is predicted by one simulation, linearised at its start, the model's parameters
+   free (`screening`); where the drive repeats, on one period of each segment (`short_recordings`).
+4. The most promising are fitted, the best of them until convergence (`compare_candidates`).
+5. Of candidates equal within the errors, the most parsimonious is taken (`parsimony`).
+6. It is added if it removes at least `ADDED_SHARE` of the error that is left above the noise. Then the next effect is
+   looked for, up to `MOST_EFFECTS`.
+
+Samples to fit, to choose by and to test are disjoint: the test samples are evaluated once, at the end (`verdict`).
+
+References: Miller, Subset Selection in Regression (2002), chapter 3; Ljung, System Identification (1999), chapter 16.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,9 +47,9 @@ from analysis.diagnosis.search.time_budget import OutOfTimeError, always, limit_
 from analysis.diagnosis.settings import (
     ADDED_GAIN,
     ADDED_SHARE,
+    HELD_OUT_SURPRISE,
     MOST_EFFECTS,
     NOISE_ALONE,
-    SEALED_SURPRISE,
     SEARCH_ON,
     WORTH_FITTING,
 )
@@ -135,7 +155,7 @@ def explain(
     retuned = _retune(context, before)
     base = context.candidate(retuned)
     confirmed = context.with_test_score(base)
-    surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > SEALED_SURPRISE)
+    surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     rounds: list[tuple[FittedCandidate, ...]] = []
     steps: list[FittedCandidate] = []
     barred, ended_early = "", False

@@ -42,7 +42,7 @@ class Part:
 class Guard:
     on: bool = False
     crashes: list[Crash] = field(default_factory=list)
-    """So far."""
+    """Crashes caught so far."""
 
     def over(self, map_: Mapper, doing: str) -> Mapper:
         """A map over effects, hypotheses or fits that notes crashes and leaves their results out."""

@@ -1,5 +1,23 @@
-"""Runs the search without clean recordings; repeats it with a part of the held-out samples where only they show a
-mismatch."""
+"""The search for missing effects with a given model, from forward selection to verdict.
+
+Theory of operation.
+
+1. `explain` selects effects forward, on the samples to fit and to choose by.
+2. Backward elimination (`prune`) removes what selection added and the result does not need: the earlier of two effects,
+   where the later alone fits as well; effects that take too little of the mismatch; effects whose parameters the data
+   do not determine (`identifiability`: the interval of the only amplitude, or its profile likelihood, contains zero).
+3. `verdict.judge` compares the held-out errors, in units of the noise, with limits: on samples that neither fitted nor
+   chose anything, a wrong explanation has no advantage over a right one.
+4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), the
+   search is repeated with a part of them opened: all but the loudest segments, else the first half of each stretch.
+   What it finds must be confirmed by the part that is still held out.
+5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`).
+
+Reference recordings of the intact device are used in `reference/search_with_reference`, not here.
+
+Reference: Hastie, Tibshirani and Friedman, The Elements of Statistical Learning (2009), section 7.2 (training,
+validation and test samples) and 3.3 (stepwise selection).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -45,7 +63,8 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
 
 
 def _drop_former(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """Without the first of the earlier effects that the others fit as well without: it stood in for a later one."""
+    """Drop the first of the earlier effects without which the others fit as well: it may have stood in for a later
+    one."""
     for number in range(len(found.steps) - 1):
         if not time_left():
             break

@@ -14,11 +14,11 @@ from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
 from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.settings import (
+    HELD_OUT_ALONE_ERROR,
+    HELD_OUT_ALONE_TIMES,
     LEAST_FITTED,
     LOUDER,
     MOST_FITTED,
-    SEALED_ALONE_ERROR,
-    SEALED_ALONE_TIMES,
     WORTH_FITTING,
 )
 from analysis.diagnosis.types import Mapper, Mask
@@ -72,13 +72,13 @@ class SearchContext:
     """Isolates crashes of single effects."""
 
     def open_half(self) -> "SearchContext":
-        """With the first half of every held-out stretch to fit and to choose by."""
+        """Copy of the context in which the first half of every held-out stretch is used to fit and to choose by."""
         return self._open([record.first_halves() for record in self.whole.records])
 
     def open_milder(self, shows: FittedCandidate) -> "SearchContext | None":
-        """With all held-out segments but the loudest to fit and to choose by, where these show a mismatch that the
-        other samples do not: the loudest still test by another kind of command. None where they do not. shows: with
-        its residuals in all samples."""
+        """Copy of the context in which all held-out segments but the loudest are used to fit and to choose by, where
+        these show a mismatch that the other samples do not: the loudest still tests by another kind of command. None
+        where they do not. shows: a fit with its residuals in all samples."""
         records = self.whole.records
         levels = [level for record in records for _, level in record.held_out_levels()]
         opened = [record.held_out_below(max(levels, default=0.0) / LOUDER) for record in records]
@@ -94,7 +94,8 @@ class SearchContext:
         return replace(self, measure=whole.shorten(), whole=whole)
 
     def fit_to_all(self) -> "SearchContext":
-        """With the samples to choose by fitted to as well: what a force balance chose needs none."""
+        """Copy of the context that also fits to the samples to choose by: what a force balance has chosen needs no
+        choice."""
         measure, whole = (
             each.with_records(tuple(record.fit_to_all() for record in each.records))
             for each in (self.measure, self.whole)
@@ -122,7 +123,7 @@ def shows_there_alone(errors: FloatArray, candidate: FittedCandidate) -> bool:
     """Whether held-out samples show a mismatch that those to fit and to choose by do not. errors: (c,), there, times
     the noise."""
     shown = float(np.nanmax(errors, initial=0.0))
-    return shown > SEALED_ALONE_ERROR and shown > SEALED_ALONE_TIMES * candidate.score.worst_channel
+    return shown > HELD_OUT_ALONE_ERROR and shown > HELD_OUT_ALONE_TIMES * candidate.score.worst_channel
 
 
 def first_fits(

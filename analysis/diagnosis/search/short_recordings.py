@@ -54,7 +54,7 @@ class _Cut:
 @dataclass(frozen=True, slots=True, eq=False)
 class ShortRecordings:
     context: SearchContext
-    """Its measure holds the kept samples alone; what there is to fit is also what is chosen by."""
+    """Context whose measure holds the kept samples alone: the samples to fit are also those to choose by."""
     kept: tuple[np.ndarray, ...]
     """Per record of the long measure that has any, the samples that are kept."""
     stands_in: Places

@@ -16,13 +16,13 @@ from analysis.diagnosis.settings import (
     CONVINCING_SHARE,
     EXPLAINED_BY_CHANCE,
     EXPLAINED_ERROR,
+    HELD_OUT_ALONE_ERROR,
     HELD_OUT_ERROR,
+    HELD_OUT_TOO_SMALL,
     NAMED_ERROR,
     NAMED_GAIN,
     NAMED_SHARE,
     NOISE_ALONE,
-    SEALED_ALONE_ERROR,
-    SEALED_TOO_SMALL,
 )
 
 
@@ -68,13 +68,13 @@ def _is_confirmed(found: Explanation) -> bool:
     whole, left = (float(np.mean(np.log(candidate.score.test))) for candidate in (found.retuned, found.after))
     if not np.isfinite(whole):
         return True
-    return whole <= SEALED_TOO_SMALL or whole - left >= CONFIRMED_SHARE * whole
+    return whole <= HELD_OUT_TOO_SMALL or whole - left >= CONFIRMED_SHARE * whole
 
 
 def confirms_addition(without: FittedCandidate, with_it: FittedCandidate) -> bool:
     """Whether the held-out samples, in their worst channel without it, confirm what `with_it` adds to a name."""
     worst = float(np.max(without.score.test))
-    if not np.isfinite(worst) or worst <= SEALED_ALONE_ERROR:
+    if not np.isfinite(worst) or worst <= HELD_OUT_ALONE_ERROR:
         return False
     left = float(np.max(with_it.score.test))
     return float(np.log(worst) - np.log(left)) >= CONFIRMED_SHARE * float(np.log(worst))

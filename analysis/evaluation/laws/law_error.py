@@ -16,7 +16,7 @@ class FreshMotion:
 
     columns: Mapping[str, FloatArray]
     added: Mapping[str, FloatArray]
-    """By axis: contribution of the true laws to its force (N), or to its reading (m/s^2)."""
+    """Contribution of the true laws to each axis's force (N) or reading (m/s^2), by axis."""
     response: bool
     """Whether `added` belongs to the reading, not to the force."""
     rate_hz: float
@@ -35,8 +35,8 @@ def _axis_error(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
         if law.axis[-1] != axis or (law.acts_on == "response") != fresh.response:
             continue
         replaced = {"force": None, "command": f"f{axis}", "response": f"a{axis}"}[law.acts_on]
-        said = evaluate(law, _begin_at_rest(fresh), fresh.rate_hz)[1:]
-        found = found + said - (0.0 if replaced is None else fresh.columns[replaced])
+        predicted = evaluate(law, _begin_at_rest(fresh), fresh.rate_hz)[1:]
+        found = found + predicted - (0.0 if replaced is None else fresh.columns[replaced])
     if not np.isfinite(found).all():
         return float("inf")
     own = [fresh.columns[name] for name in ((f"a{axis}",) if fresh.response else (f"a{axis}", f"v{axis}", axis))]

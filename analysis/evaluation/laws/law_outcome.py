@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect
 from analysis.evaluation.proof.outcome import DETECTABLE
+from equalizer.effects.discovered_law import has_memory
 from equalizer.laws.law import Law, law_of
-from equalizer.laws.parse import MEMORY
-from equalizer.laws.tree import Apply, nodes
 
 CLOSE = 0.05
 """Relative error up to which a law counts as the same function (issue 16)."""
@@ -37,21 +36,21 @@ class LawOutcome:
     truth: TrueLaw | None
     adds: float
     """Change of the readings by the law: rms over the noise's, in the worst channel."""
-    said: Diagnosis | None
+    diagnosis: Diagnosis | None
     """The diagnosis; None: it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
-    """By "before", "retuned", "after", then by channel: rms over the noise's, on held-out samples."""
+    """Rms error on held-out samples over the noise's rms: by stage ("before", "retuned", "after"), then by channel."""
     seconds: float
     errors: tuple[float, ...] = ()
     """Error of the reported laws (`law_error`): in the visited range, and at a higher level."""
 
     @property
     def named(self) -> tuple[Law, ...]:
-        return _collect_laws(() if self.said is None else self.said.effects)
+        return _collect_laws(() if self.diagnosis is None else self.diagnosis.effects)
 
     @property
     def candidates(self) -> tuple[Law, ...]:
-        return _collect_laws(() if self.said is None else self.said.candidates)
+        return _collect_laws(() if self.diagnosis is None else self.diagnosis.candidates)
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -61,19 +60,21 @@ class LawOutcome:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects that the catalogue holds."""
-        return () if self.said is None else tuple(each.effect for each in self.said.effects if each.law is None)
+        return (
+            () if self.diagnosis is None else tuple(each.effect for each in self.diagnosis.effects if each.law is None)
+        )
 
     @property
     def verdict(self) -> str:
-        return "failed" if self.said is None else self.said.verdict
+        return "failed" if self.diagnosis is None else self.diagnosis.verdict
 
     def left(self, stage: str) -> float:
         return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))
 
     @property
     def shows(self) -> bool:
-        """A diagnosis that broke down counts as one that should have seen something."""
-        return self.said is None or self.left("retuned") > DETECTABLE
+        """Whether the re-tuned model leaves a detectable error; a failed diagnosis counts as if it did."""
+        return self.diagnosis is None or self.left("retuned") > DETECTABLE
 
     @property
     def structured(self) -> bool:
@@ -99,7 +100,7 @@ class LawOutcome:
 
     @property
     def missed(self) -> bool:
-        if self.said is None or self.false_law or self.wrongly_explained:
+        if self.diagnosis is None or self.false_law or self.wrongly_explained:
             return True
         return self.truth is not None and self.shows and not (self.structured and self.close)
 
@@ -109,18 +110,14 @@ def _collect_laws(found: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[L
 
 
 def _has_true_structure(laws: Sequence[Law], truth: TrueLaw) -> bool:
-    said = {axis: [law for law in laws if law.axis[-1] == axis] for axis in {law.axis[-1] for law in laws}}
-    if set(said) != set(truth.axes):
+    laws_by_axis = {axis: [law for law in laws if law.axis[-1] == axis] for axis in {law.axis[-1] for law in laws}}
+    if set(laws_by_axis) != set(truth.axes):
         return False
     for axis, readings in zip(truth.axes, truth.variables, strict=True):
-        variables = " ".join(sorted({name for law in said[axis] for name in law.variables}))
-        remembers = any(_has_memory(law) for law in said[axis])
+        variables = " ".join(sorted({name for law in laws_by_axis[axis] for name in law.variables}))
+        remembers = any(has_memory(law) for law in laws_by_axis[axis])
         if variables not in readings or remembers != truth.memory:
             return False
-        if any(law.acts_on not in truth.acts_on for law in said[axis]):
+        if any(law.acts_on not in truth.acts_on for law in laws_by_axis[axis]):
             return False
     return True
-
-
-def _has_memory(law: Law) -> bool:
-    return any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree))

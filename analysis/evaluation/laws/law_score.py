@@ -20,7 +20,7 @@ def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
     shown = [each for each in laws if each.shows]
     nulls = [each for each in outcomes if each.kind == "nothing"]
     others = [each for each in outcomes if each.kind in ("decoy", "mode")]
-    said = [each for each in shown if each.named]
+    with_names = [each for each in shown if each.named]
     figures = (
         share("laws that show", laws, lambda each: each.shows),
         share("of these a law is named", shown, lambda each: bool(each.named)),
@@ -30,7 +30,7 @@ def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
         share("function within 5 % where it was visited", shown, lambda each: each.close),
         share("function within 5 % on louder commands", shown, lambda each: each.close_louder),
         share("wrong law explained, of laws that show", shown, lambda each: each.wrongly_explained),
-        share("wrong law explained, of laws named", said, lambda each: each.wrongly_explained),
+        share("wrong law explained, of laws named", with_names, lambda each: each.wrongly_explained),
         share("a name of the catalogue explained instead", shown, _explained_by_other_effect),
         share("a law named where nothing is missing", nulls, lambda each: each.false_law),
         share("a law named on decoys", others, lambda each: each.false_law),

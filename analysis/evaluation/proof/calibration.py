@@ -10,6 +10,7 @@ from analysis.evaluation.proof.share import RESAMPLED, wilson
 from equalizer.signals.signal import FloatArray
 
 BINS = 10
+"""Bins of the calibration curve, with equally many answers each."""
 TIED = 3
 """Decimals to which probabilities are compared. Names that tie share their right answers equally, in any bin."""
 ANSWERABLE = ("nothing", "single", "pair")

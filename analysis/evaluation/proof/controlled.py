@@ -8,7 +8,7 @@ from analysis.diagnosis.document import Diagnosis
 CONFIDENT = 0.5
 """A probability from which a name is a confident one."""
 SAME_NUMBER = 0.02
-"""Relative: answers to mirrored recordings may differ by so much more than their sign."""
+"""Largest relative difference of parameters, their sign apart, between answers to mirrored recordings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class ControlOutcome:
     claim: str
     held: bool
     said: tuple[str, ...]
-    """Each answer in words."""
+    """Each answer in words; the field of this name in the proof's JSON."""
 
 
 def judge_control(name: str, claim: str, answers: Sequence[Diagnosis | None]) -> ControlOutcome:
@@ -41,13 +41,13 @@ def _no_mismatch(answers: Sequence[Diagnosis | None]) -> bool:
 
 def _same_answers(answers: Sequence[Diagnosis | None]) -> bool:
     """The same verdict, effects and axes, and at least one effect."""
-    said = {_verdict_and_effects(answer, with_axes=True) for answer in answers if answer is not None}
-    return len(said) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
+    distinct = {_verdict_and_effects(answer, with_axes=True) for answer in answers if answer is not None}
+    return len(distinct) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
 def _same_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
-    said = {_verdict_and_effects(answer, with_axes=False) for answer in answers if answer is not None}
-    return len(said) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
+    distinct = {_verdict_and_effects(answer, with_axes=False) for answer in answers if answer is not None}
+    return len(distinct) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
 def _axis_exchanged(answers: Sequence[Diagnosis | None]) -> bool:

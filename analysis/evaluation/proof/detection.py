@@ -9,6 +9,7 @@ from analysis.evaluation.proof.outcome import DETECTABLE, Outcome
 from analysis.evaluation.proof.share import wilson
 
 PARTS = 10
+"""Bins of the detection curve over strength, with equally many cases each."""
 LEAST_DRAWS = 3
 """Fewest draws for a line fit."""
 

@@ -7,19 +7,20 @@ from analysis.diagnosis.document import Diagnosis
 from analysis.evaluation.proof.share import Figure, share
 
 NOTHING, MISSING = "nothing", "missing"
-"""A change that is none; a verdict that was not given."""
+"""Name of the change that changes nothing (control); verdict of a recording without a diagnosis."""
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Something that is done to the device."""
+    """A change that the lab makes to the device."""
 
     name: str
     how: str
+    """Instruction to the lab."""
     effects: tuple[str, ...]
-    """Any of these is right; none for nothing."""
+    """Effects of which any is a right answer; empty for the control."""
     unit: str
-    """Of the number that the one who changes it writes down; empty where there is none."""
+    """Unit of the value that the lab writes down for this change; empty where there is none."""
 
 
 CHANGES: tuple[Change, ...] = (
@@ -71,6 +72,8 @@ class Label:
 
 @dataclass(frozen=True, slots=True)
 class Scored:
+    """A diagnosis beside the change that was made."""
+
     recording: str
     change: str
     value: float | None

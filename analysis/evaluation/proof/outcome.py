@@ -35,10 +35,10 @@ class Outcome:
     """0 = the weakest that is drawn, 1 = the strongest."""
     adds: float
     """Change of the readings by the concealed effects: rms over the noise's, in the worst channel."""
-    said: Diagnosis | None
+    diagnosis: Diagnosis | None
     """The diagnosis; None: it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
-    """By "before", "retuned", "after", then by channel: rms over the noise's, on held-out samples."""
+    """Rms error on held-out samples over the noise's rms: by stage ("before", "retuned", "after"), then by channel."""
     seconds: float
 
     @property
@@ -47,7 +47,7 @@ class Outcome:
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:
-        return () if self.said is None else self.said.effects
+        return () if self.diagnosis is None else self.diagnosis.effects
 
     @property
     def named_names(self) -> tuple[str, ...]:
@@ -55,12 +55,12 @@ class Outcome:
 
     @property
     def verdict(self) -> str:
-        return "failed" if self.said is None else self.said.verdict
+        return "failed" if self.diagnosis is None else self.diagnosis.verdict
 
     @property
     def detectable(self) -> bool:
-        """A diagnosis that broke down counts as one that should have seen something."""
-        return self.said is None or self.left("retuned") > DETECTABLE
+        """Whether the re-tuned model leaves a detectable error; a failed diagnosis counts as if it did."""
+        return self.diagnosis is None or self.left("retuned") > DETECTABLE
 
     @property
     def seen_by_oracle(self) -> bool:
@@ -75,7 +75,7 @@ class Outcome:
 
     @property
     def returned(self) -> tuple[str, ...]:
-        return () if self.said is None else self.said.returned_set
+        return () if self.diagnosis is None else self.diagnosis.returned_set
 
     def left(self, stage: str) -> float:
         """Error over noise in the worst channel; nan where it is not known."""

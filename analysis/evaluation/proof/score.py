@@ -16,15 +16,15 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 TURN = 2 * math.pi
 
 
-def nearest_true_value(name: str, said: float, values: Mapping[str, float]) -> float:
+def nearest_true_value(name: str, estimate: float, values: Mapping[str, float]) -> float:
     """The true value of a parameter; where other values act the same, that nearest to the stated one. values: all true
     ones of the effect.
     """
     true = values[name]
     if name == "phase":
-        return true + TURN * round((said - true) / TURN)
+        return true + TURN * round((estimate - true) / TURN)
     if name == "position" and values.get("opposite") == 1.0:
-        return math.copysign(true, said)
+        return math.copysign(true, estimate)
     return true
 
 
@@ -34,7 +34,7 @@ NOT_EXPLAINED = ("unexplained", "partly_explained")
 def is_miss(outcome: Outcome) -> bool:
     """Whether an answer counts as a miss: a wrong name always does, even where nothing was detectable; where the true
     effect is excluded, any name does."""
-    if outcome.said is None or has_wrong_name(outcome):
+    if outcome.diagnosis is None or has_wrong_name(outcome):
         return True
     if outcome.kind in ("nothing", "without") or not outcome.detectable:
         return False
@@ -55,8 +55,8 @@ def is_on_other_axis(outcome: Outcome) -> bool:
         return False
     true = {each.effect: each.axis for each in outcome.concealed}
     return any(
-        true.get(said.effect) is not None and said.axis is not None and said.axis != true[said.effect]
-        for said in outcome.named
+        true.get(each.effect) is not None and each.axis is not None and each.axis != true[each.effect]
+        for each in outcome.named
     )
 
 
@@ -68,7 +68,7 @@ class Score:
     figures: tuple[Figure, ...]
     calibration: Calibration
     misses: tuple[Outcome, ...]
-    """Everything that is not as it should be; what cannot be detected is none."""
+    """Wrong answers; a missing name for something undetectable is not wrong."""
 
 
 def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Score:
@@ -148,25 +148,25 @@ def _number_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     yield statistic("seconds per diagnosis, median", [outcome.seconds for outcome in outcomes], np.median)
 
 
-def main_error(true: Concealed, said: NamedEffect) -> float | None:
+def main_error(true: Concealed, named: NamedEffect) -> float | None:
     """Relative; None where the label holds no such number."""
     name = EFFECTS_BY_NAME[true.effect].main.name
     if not true.values.get(name):
         return None
-    estimate = said.parameters[name].value
+    estimate = named.parameters[name].value
     value = nearest_true_value(name, estimate, true.values)
     return abs(estimate - value) / abs(value)
 
 
-def interval_coverage(true: Concealed, said: NamedEffect) -> dict[str, bool]:
+def interval_coverage(true: Concealed, named: NamedEffect) -> dict[str, bool]:
     """Whether the interval holds the true value, of every parameter that has both."""
     found = {}
-    for name, estimate in said.parameters.items():
+    for name, estimate in named.parameters.items():
         if estimate.ci95 is not None and name in true.values:
             value = nearest_true_value(name, estimate.value, true.values)
             found[name] = estimate.ci95[0] <= value <= estimate.ci95[1]
     return found
 
 
-def is_main_covered(true: Concealed, said: NamedEffect) -> bool:
-    return interval_coverage(true, said)[EFFECTS_BY_NAME[true.effect].main.name]
+def is_main_covered(true: Concealed, named: NamedEffect) -> bool:
+    return interval_coverage(true, named)[EFFECTS_BY_NAME[true.effect].main.name]

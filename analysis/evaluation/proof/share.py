@@ -11,6 +11,7 @@ from equalizer.signals.signal import FloatArray
 
 Item = TypeVar("Item")
 RESAMPLED = 2000
+"""Draws of a bootstrap interval."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,9 +17,9 @@ def concealed_text(outcome: Outcome) -> str:
     return " + ".join(f"{c.effect}{f' of {c.axis}' if c.axis else ''}" for c in outcome.concealed) or "nothing"
 
 
-def said_text(outcome: Outcome) -> str:
-    said = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in outcome.named)
-    return f"{outcome.verdict.replace('_', ' ')}{f': {said}' if said else ''}"
+def answer_text(outcome: Outcome) -> str:
+    text = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in outcome.named)
+    return f"{outcome.verdict.replace('_', ' ')}{f': {text}' if text else ''}"
 
 
 def strength_text(outcome: Outcome) -> str:

@@ -6,21 +6,19 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
+from equalizer.signals.listed_problems import ListedProblemsError
+
 FORMAT, VERSION = "hapteq-reproduction", 1
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
-class ReproductionError(ValueError):
+class ReproductionError(ListedProblemsError):
     """A document that is not a reproduction. `problems`: one sentence each."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True, config=STRICT)
 class Finding:
-    """One thing that the paper reports, beside what came out here."""
+    """One finding of the paper, beside the reproduced value."""
 
     what: str
     published: Annotated[str, Field(description="What the paper reports; empty where it reports nothing.")]

@@ -11,6 +11,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 RESONANCE_HZ = (9.0, 14.0)
+"""Range around the published resonance at 11 Hz."""
 REMOVED = 1 / 3
 """Share of a resonance's height in dB up to which it counts as essentially removed."""
 ORDER_DB = (10.0, 30.0)

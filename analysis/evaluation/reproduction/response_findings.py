@@ -15,6 +15,7 @@ from equalizer.identification.frequency_response.resonances import COUPLING, Res
 NEAR = 0.2
 """Largest relative difference of frequencies that count as near each other."""
 SLOPE_HZ = (4.5, 9.0)
+"""Range below the resonance in which the slope is measured."""
 LARGE = 3.0
 """Ratio to the median in the middle band from which a resonance counts as large."""
 

@@ -10,6 +10,7 @@ from analysis.psychophysics.threshold_table import frequency_name
 from analysis.wording import signed_number
 
 SIGNIFICANT_P = 0.05
+"""Level of significance of the published analysis."""
 LIKE = 0.25
 """Two means that differ by less than this share of the larger one are fairly similar."""
 

@@ -16,7 +16,7 @@ from analysis.figures.picture import Picture, count_in_samples
 
 
 def diagnosis_pictures(found: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
-    """Only what there is data for. guard: of figures whose drawing crashes, which are left out."""
+    """Draw the figures for which there are data. guard: catches a figure whose drawing crashes, which is left out."""
     drawn = (guard or Guard()).parts(map, diagnosis_drawings(found))
     return tuple(picture for several in drawn for picture in several)
 

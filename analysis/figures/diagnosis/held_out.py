@@ -11,15 +11,18 @@ from analysis.diagnosis.result.findings import TimeSeries
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.diagnosis.stage_style import AFTER, BEFORE, MEASURED, RETUNED, STAGES, Stage
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, ratio_ticks, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, plain_axes, ratio_ticks
 from equalizer.signals.signal import FloatArray
 
 _CYCLES = 5.0
 """Cycles of the effect's change in the excerpt."""
 _SHORTEST_S, _LONGEST_S = 0.1, 3.0
+"""Shortest and longest stretch that is drawn."""
 _MARKERS = {"before": "s", "retuned": "D", "after": "o"}
 _STRETCHES = 60
+"""Number of stretches from which the drawn one is chosen."""
 _STANDING = 0.01
+"""Weight of a constant change beside a varying one, when a stretch is chosen."""
 
 ChannelErrors = Mapping[str, Mapping[str, float]]
 
@@ -96,7 +99,7 @@ def _visibility(change: FloatArray) -> FloatArray:
 def draw_held_out(excerpt: Excerpt | None, noise_rms: Mapping[str, float], errors: ChannelErrors) -> Figure:
     channels = list(next(iter(errors.values()), {}))
     if excerpt is None and not channels:
-        return say_nothing_to_draw(new_figure(8.6, 1.6), "There are no held-out data to draw.")
+        return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
     figure = new_figure(8.8, max(4.2, 1.4 + 0.34 * len(channels)))
     if excerpt is None:
         _draw_errors(figure.add_subplot(), errors)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.figures.diagnosis.stage_style import STAGES, Stage
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, new_figure, ratio_ticks, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, ratio_ticks
 from equalizer.signals.signal import FloatArray
 
 _LOUDEST = 300.0
@@ -24,11 +24,13 @@ _LETTER_IN = 0.075
 _ROW_IN, _BETWEEN_IN = 0.25, 0.2
 """Height of a row of cells, and between panels."""
 _MOST_LEVELS = 4
+"""Most levels drawn separately; more are grouped."""
 _NUMBERED = 1.15
 """Residual over noise below which a cell has no number."""
 _SQUARE = ((-0.46, -0.46), (0.46, -0.46), (0.46, 0.46), (-0.46, 0.46), (-0.46, -0.46))
 _UNIT = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
 _WIDTH_IN = 8.8
+"""Width of the figure, inches."""
 _FINE, _GAP = 4, 0.25
 """Points per cell, along each side, and cells between panels: a whole number of points."""
 _NUMBERS_FIT = 10
@@ -77,7 +79,7 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
     seconds."""
     layout = _make_layout(maps, input_)
     if not layout.stages or not layout.bands:
-        return say_nothing_to_draw(new_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
+        return draw_no_data_note(new_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
     figure = new_figure(_WIDTH_IN, 0.9 + len(layout.levels) * (_BETWEEN_IN + _ROW_IN * len(layout.channels)))
     axes, beside = _add_axes(figure, layout)
     table, frames = _fill_table(maps, input_, layout)
@@ -115,8 +117,8 @@ def _fits_upright(layout: _Layout) -> bool:
 
 
 def _row_label(channel: tuple[str, str], level: float, layout: _Layout) -> str:
-    said = _channel_label(channel, layout)
-    return said if _fits_upright(layout) or not level else f"{said} at {level:.3g}"
+    label = _channel_label(channel, layout)
+    return label if _fits_upright(layout) or not level else f"{label} at {level:.3g}"
 
 
 def _add_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:

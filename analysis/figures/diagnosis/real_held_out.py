@@ -8,7 +8,7 @@ from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, RealAnswer
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.diagnosis.stage_style import AFTER, MEASURED, RETUNED
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, new_figure, plain_axes, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, draw_no_data_note, new_figure, plain_axes
 
 _LOWEST = 1e-4
 """Share of the signal below which nothing is drawn."""
@@ -16,14 +16,14 @@ _LOWEST = 1e-4
 
 def real_picture(answer: RealAnswer) -> Picture:
     rows = error_rows(answer)
-    said = "; ".join(f"{name} {100 * value:.3g} %" for name, value, _ in rows)
+    text = "; ".join(f"{name} {100 * value:.3g} %" for name, value, _ in rows)
     return Picture(
         name=f"held-out-{_plain_name(answer.folder)}-{_plain_name(answer.recording)}",
         title=f"Held-out data of {answer.recording}",
         caption="Left: where what was found changes the prediction most. Right: errors on all held-out data as a share "
         "of the signal, logarithmic; shorter is better.",
         figure=_draw_answer(answer.excerpt, rows),
-        alternative=said or "Nothing was held out.",
+        alternative=text or "Nothing was held out.",
     )
 
 
@@ -44,7 +44,7 @@ def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
 
 def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]]) -> Figure:
     if excerpt is None or not rows:
-        return say_nothing_to_draw(new_figure(8.6, 1.6), "There are no held-out data to draw.")
+        return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
     figure = new_figure(8.8, 3.4)
     grid = figure.add_gridspec(1, 2, width_ratios=[1.75, 1])
     _draw_excerpt(figure.add_subplot(grid[0, 0]), excerpt)

@@ -12,9 +12,10 @@ from analysis.diagnosis.result.residual_spectrum import RemainderSpectrum
 from analysis.diagnosis.unit_wording import typeset_unit
 from analysis.figures.diagnosis.stage_style import AFTER, RETUNED
 from analysis.figures.picture import Picture
-from analysis.figures.style import GREY, new_figure, plain_axes, power_of_ten, say_nothing_to_draw
+from analysis.figures.style import GREY, draw_no_data_note, new_figure, plain_axes, power_of_ten
 
 _COLUMNS = 3
+"""Panels side by side."""
 _SIGNAL = Line2D([], [], color=GREY, linewidth=0.9, label="measured")
 _NOISE = Line2D([], [], color=GREY, linewidth=4, alpha=0.4, label="noise")
 
@@ -32,7 +33,7 @@ def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
 
 def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
     if not spectra:
-        return say_nothing_to_draw(new_figure(8.6, 1.6), "There are no held-out data to draw.")
+        return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
     columns = min(_COLUMNS, len(spectra))
     rows = -(-len(spectra) // columns)
     figure = new_figure(8.8, 0.9 + (2.1 if columns > 1 else 2.6) * rows)

@@ -15,11 +15,12 @@ from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.figures.diagnosis.stage_style import AFTER, RETUNED
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, new_figure, plain_axes, ratio_ticks, say_nothing_to_draw
+from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, plain_axes, ratio_ticks
 from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
 MOST_RIVALS = 8
+"""Most rivals that are drawn."""
 _SEEN = "The data that were fitted to and chosen by; rivals are not tried on held-out data."
 _BOTH = "Filled: the data that were fitted to and chosen by; open: held-out data, by which nothing was chosen."
 _ORDINALS = ("first", "second", "third", "fourth", "fifth")
@@ -77,7 +78,7 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
 def draw_rivals(tried: Sequence[TriedExplanation], retuned: TriedExplanation, held: bool = True) -> Figure:
     """The chosen one on top, marked where it is held to be true."""
     if not tried:
-        return say_nothing_to_draw(new_figure(7.4, 1.4), "Nothing was tried.")
+        return draw_no_data_note(new_figure(7.4, 1.4), "Nothing was tried.")
     figure = new_figure(8.8, 1.05 + 0.3 * len(tried))
     axes = figure.add_subplot()
     plain_axes(axes)

@@ -10,7 +10,7 @@ from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.result.findings import Signature
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, BLUE, GREY, new_figure, plain_axes, say_nothing_to_draw
+from analysis.figures.style import BLACK, BLUE, GREY, draw_no_data_note, new_figure, plain_axes
 from analysis.wording import typeset
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
@@ -44,7 +44,7 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
 def draw_signature(signature: Signature) -> Figure:
     figure = new_figure(8.8, 4.0)
     if not len(signature.measured_at):
-        return say_nothing_to_draw(figure, "Too few samples show this effect to draw it.")
+        return draw_no_data_note(figure, "Too few samples show this effect to draw it.")
     axes = figure.add_subplot()
     plain_axes(axes)
     along, x_factor = _scaled_label(signature.along, signature.measured_at)
@@ -78,11 +78,11 @@ def draw_signature(signature: Signature) -> Figure:
     return figure
 
 
-def _scaled_label(said: str, values: FloatArray) -> tuple[str, float]:
+def _scaled_label(text: str, values: FloatArray) -> tuple[str, float]:
     """ "velocity of x (m/s)" as "Velocity of x (mm/s)", with the factor that goes with it."""
-    words, bracket, rest = said.rpartition(" (")
+    words, bracket, rest = text.rpartition(" (")
     if not bracket or "/√" in rest or rest.startswith("Hz"):
-        return said[:1].upper() + said[1:], 1.0
+        return text[:1].upper() + text[1:], 1.0
     scale = scale_of(rest.removesuffix(")"), float(np.max(np.abs(values))))
     return f"{words[:1].upper()}{words[1:]} ({scale.unit})", scale.factor
 

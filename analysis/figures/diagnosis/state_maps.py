@@ -20,7 +20,7 @@ _SEEN = 0.998
 
 
 def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
-    """Of the first axis: the states, then the loops."""
+    """Pictures of the first axis: its states, then its loops."""
     if not maps:
         return ()
     first = maps[0]
@@ -37,12 +37,12 @@ def state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
         figure=_draw_states(first),
         alternative=" ".join(_alternative_text(view, first.unit) for view in first.views),
     )
-    said = f", and {first.completed}" if first.completed else ""
+    text = f", and {first.completed}" if first.completed else ""
     loops = Picture(
         name="state-loops",
         title=f"The force{along} over a stretch of the motion",
         caption=f"About one period, where the travel is widest: the force as it was, as {first.model} would need it"
-        f"{said}. The area inside a loop over the position is work that is lost.",
+        f"{text}. The area inside a loop over the position is work that is lost.",
         figure=_draw_loops(first),
         alternative=_loop_text(first),
     )

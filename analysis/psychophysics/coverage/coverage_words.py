@@ -44,27 +44,27 @@ class MeasuredCoverage:
 def coverage_lines(rows: Sequence[MeasuredCoverage]) -> list[str]:
     """A table in Markdown."""
     lines = ["| interval | median threshold | bias (dB), of what has a size | holds the truth |", "|---|---|---|---|"]
-    for name, said in NAMES.items():
+    for name, title in NAMES.items():
         for row in rows:
             if row.analysis == name:
                 bias = "" if row.bias_db is None else signed_number(row.bias_db)
-                lines.append(f"| {said} | {CASES_HZ.get(row.frequency_hz, '')} | {bias} | {row.percent} |")
+                lines.append(f"| {title} | {CASES_HZ.get(row.frequency_hz, '')} | {bias} | {row.percent} |")
     return lines
 
 
 def coverage_sentence(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
     """Coverage and bias of one analysis, at each median threshold. Empty where nothing was measured."""
-    said = []
+    texts = []
     for row in rows:
         if row.analysis == analysis and row.frequency_hz:
             known = row.bias_db is not None and analysis not in ONLY_BELOW
             bias = f" (off by {signed_number(row.bias_db or 0.0, 1)} dB)" if known else ""
-            said.append(f"{number(100 * row.covered / row.intervals, 0)} % at {CASES_HZ[row.frequency_hz]}{bias}")
+            texts.append(f"{number(100 * row.covered / row.intervals, 0)} % at {CASES_HZ[row.frequency_hz]}{bias}")
         elif row.analysis == analysis:
             return f"{_SIMULATED}, {NAMES[analysis]} {row.percent}, where it says 5 %."
-    if not said:
+    if not texts:
         return ""
-    return f"{_SIMULATED}, the 95 % intervals of the {NAMES[analysis]}, held the truth: {conjoin(said)}."
+    return f"{_SIMULATED}, the 95 % intervals of the {NAMES[analysis]}, held the truth: {conjoin(texts)}."
 
 
 _SIMULATED = "Measured near the cap, simulated with the published staircase"

@@ -32,6 +32,7 @@ LOGITS_PER_D = 1.702
 RELYING = LOGITS_PER_D / USUAL_NOISE_DB
 """Slope in logits per dB of a participant with the usual internal noise who goes by the cue alone."""
 STEPS, SETTLED = 50, 1e-8
+"""Most Newton steps of the logistic regression, and relative change at which it has converged."""
 FLATTEST_DB = 1e-6
 """A residual that varies by less is rounding."""
 

@@ -23,6 +23,7 @@ from equalizer.signals.signal import FloatArray
 INTERNAL_NOISE_DB = (0.5, 1.0, 2.0)
 """A very keen, a usual and a dull judge of strength: difference limens of vibration are near 1 dB."""
 USUAL_NOISE_DB = 1.0
+"""Standard deviation of a person's perceived level, dB."""
 NOTICEABLE = 1.0
 """d' of one just noticeable difference."""
 CONFIDENCE = 0.95

@@ -18,6 +18,7 @@ from analysis.wording import conjoin, number, p_text, signed_number
 from protocols.trial import Trial
 
 LEVEL = 0.05
+"""Level of significance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +117,8 @@ def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tu
             f"Within a direction, answers followed what was delivered, so direction was not the only cue: "
             f"{conjoin(followed)}."
         )
-    if said := gap_text([gap for gap in gaps if gap.missing < gap.trials]):
-        sentences.append(said)
+    if sentence := gap_text([gap for gap in gaps if gap.missing < gap.trials]):
+        sentences.append(sentence)
     return tuple(sentences)
 
 

@@ -79,7 +79,7 @@ def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
 
 
 def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
-    """By frequency and cue, only where something is missing."""
+    """Missing measurements by frequency and cue; only where something is missing."""
     gaps = []
     for group in delivered_trials(trials):
         n = len(group.person)

@@ -23,8 +23,9 @@ class ShareBin:
 
 @dataclass(frozen=True, slots=True)
 class GoodnessOfFit:
-    """Without a p-value: levels follow answers, and each person's numbers were fitted to them, so the lowest bins come
-    out some standard errors too low although the model is right. Look for departures with a shape."""
+    """Observed and expected shares in bins. There is no p-value: levels follow answers, and each person's parameters
+    were fitted to them, so the lowest bins come out some standard errors too low although the model is right. Look for
+    departures with a shape."""
 
     bins: tuple[ShareBin, ...]
 

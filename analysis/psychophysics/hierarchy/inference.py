@@ -139,10 +139,9 @@ def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prio
 def direction_limit(
     frequencies_hz: tuple[float, ...], pseudo: FloatArray, cap_db: float, confidence: float
 ) -> DirectionLimit:
-    """From pseudo-thresholds (n, k). Between the frequencies played: straight lines over the logarithm of frequency.
-
-    The interval holds every frequency whose median threshold may be the cap: its own interval contains the cap.
-    """
+    """Estimate the direction limit from pseudo-thresholds (n, k). Between the frequencies played: straight lines over
+    the logarithm of frequency. The interval holds every frequency whose median threshold may be the cap: its own
+    interval contains the cap."""
     grid = np.geomspace(frequencies_hz[0], frequencies_hz[-1], 2001)
     weights = np.array([np.interp(np.log(grid), np.log(frequencies_hz), row) for row in np.eye(len(frequencies_hz))])
     lines = pseudo @ weights

@@ -26,6 +26,7 @@ from analysis.psychophysics.hierarchy.likelihood import Derivatives, TrialLikeli
 from equalizer.signals.signal import FloatArray
 
 NEWTON_STEPS = 60
+"""Most Newton steps to the mode of a person's parameters."""
 SETTLED = 1e-11
 """Newton decrement of the log-likelihood at which a mode is found: then the gradient is right to some six digits."""
 LOWEST_CURVATURE = 1e-5

@@ -51,7 +51,7 @@ def shares_of_person(answers: Answers, person: int, place: int) -> tuple[Observe
 
 
 def shares_of_people(answers: Answers, fit: FittedCurves, place: int) -> tuple[ObservedShare, ...]:
-    """Of all people at one frequency, over levels in dB re each person's own threshold by the model.
+    """Observed shares of all people at one frequency, over levels in dB re each person's own threshold by the model.
 
     Against the levels themselves they would say little: a staircase holds everyone near 79 %, so that the low levels
     are those of sensitive people, and the shares of all people together are the same at all levels.

@@ -23,11 +23,12 @@ from equalizer.signals.signal import FloatArray
 from protocols.procedure.staircase import to_db
 
 CONFIDENCE = 0.95
+"""Default confidence of all intervals."""
 
 
 @dataclass(frozen=True, slots=True)
 class PersonEstimate:
-    """One person's numbers, drawn towards the others' where their own answers say little."""
+    """One person's parameters, shrunk towards the population's where their own answers say little (posterior mode)."""
 
     subject: str
     thresholds_n: tuple[float, ...]
@@ -40,6 +41,8 @@ class PersonEstimate:
 
 @dataclass(frozen=True, slots=True)
 class PrimaryAnalysis:
+    """Estimates of the hierarchical psychometric model."""
+
     family: Family
     trials: int
     frequencies_hz: tuple[float, ...]
@@ -52,11 +55,11 @@ class PrimaryAnalysis:
     limit: DirectionLimit
     persons: tuple[PersonEstimate, ...]
     runs: tuple[RunLikelihood, ...]
-    """Each person at each frequency by those answers alone."""
+    """Likelihood of each person's threshold at each frequency, by those answers alone."""
     person_sd_db: float
-    """Between people, at all frequencies."""
+    """Standard deviation between people, common to all frequencies."""
     frequency_sd_db: float
-    """Person x frequency: between people, beyond what they share over frequencies."""
+    """Standard deviation of the interaction person x frequency."""
     slope: float
     slope_log_sd: float
     criterion_sd: float
@@ -76,8 +79,8 @@ def primary_analysis(
     confidence: float = CONFIDENCE,
     declared_hz: Sequence[float] = (),
 ) -> PrimaryAnalysis | None:
-    """None below two persons or two frequencies with answers. declared_hz: the declared contrast's, first minus second,
-    or none."""
+    """Fit the hierarchical model to all answers; None with fewer than two persons or two frequencies with answers.
+    declared_hz: the declared contrast's frequencies, first minus second, or none."""
     if answers is None or answers.persons < 2:
         return None
     asked_hz, answers = answers.frequencies_hz, at_played_frequencies(answers)

@@ -25,7 +25,7 @@ from equalizer.signals.signal import FloatArray
 GRID_DB, BEYOND_DB = 0.1, 30.0
 """Step of the threshold grid, and how far it reaches below the levels played and above them and the cap."""
 NODES = 7
-"""Of an average over slopes, or over criteria."""
+"""Nodes of the Gauss-Hermite rule that averages over slopes, or over criteria."""
 SAME_HEIGHT = 1e-9
 """Log-likelihoods closer than this differ by rounding alone."""
 
@@ -40,12 +40,13 @@ class Nuisance:
     """Equally probable lapse rates."""
     slope_log_sd: float = 0.0
     criterion_sd: float = 0.0
-    """Of normal distributions around the first two; 0: known."""
+    """Standard deviations of normal distributions around the slope's logarithm and the criterion; 0: known exactly."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunLikelihood:
-    """In dB re 1 N. An interval holds every threshold that the answers do not contradict."""
+    """Threshold of one person at one frequency by those answers alone, in dB re 1 N. Its interval holds every threshold
+    that the answers do not contradict."""
 
     subject: str
     frequency_hz: float

@@ -21,8 +21,9 @@ from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelih
 from protocols.procedure.staircase import to_db
 
 SLOPE_LOG_SD, CRITERION_SD = 0.4, 0.3
-"""Of the priors: twice what the simulated people of `hapteq power` differ by."""
+"""Standard deviations of the priors: twice the differences among the simulated people of `hapteq power`."""
 LAPSE_QUANTILES = (1 / 6, 1 / 2, 5 / 6)
+"""Quantiles of the lapse rate's prior that are averaged over: the middles of three equally probable parts."""
 FREE_DB = 30.0
 """SD of the prior of each threshold around the levels played: it holds those that the answers do not."""
 

@@ -35,13 +35,13 @@ class RuleResult:
     """Mean of a run."""
     bias_db: float
     sd_db: float
-    """Of the errors of a run."""
+    """Mean and standard deviation of the error of one run's estimate."""
     error_db: float
     """Root of the mean square error of a run."""
     error_per_trial_db: float
     """Times the root of the mean number of trials."""
     highest_n: float
-    """Of all levels."""
+    """Highest of all levels."""
 
 
 def compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
@@ -59,7 +59,7 @@ def compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
 
 
 def compare_rules(crowd: Crowd, rules: Mapping[str, StaircaseRule], people: int, seed: int) -> tuple[RuleResult, ...]:
-    """One run of each of so many people, drawn from the crowd's first frequency, under every rule."""
+    """One run of each person under every rule; the people are drawn from the crowd's first frequency."""
     return tuple(_result(name, rule, crowd, people, seed) for name, rule in rules.items())
 
 
@@ -111,7 +111,7 @@ def _is_right(crowd: Crowd, steps: float, criterion: float, draw: FloatArray) ->
 
 
 def estimated_db(rule: StaircaseRule, state: StaircaseState) -> float:
-    """Of a complete run: as the analysis of a session has it."""
+    """Threshold of a complete run, in dB re 1 N, estimated as in the analysis of a session."""
     if rule.is_bayesian:
         cap_db = to_db(rule.cap_n)
         return min(estimate(posterior(state.answered, cap_db), cap_db).mean_db, cap_db)

@@ -29,7 +29,7 @@ class FeltDelivery:
     adaptation_db: float = 1.0
     """Rise of the threshold in a long run."""
     adaptation_trials: float = 20.0
-    """After so many trials, 63 % of it has come."""
+    """Time constant of adaptation, in trials."""
 
 
 def felt_delivery(
@@ -63,7 +63,7 @@ def _table(group: DeliveredTrials, side: float, flawless: float) -> Table:
 
 
 def _median(values: FloatArray) -> float | None:
-    """Of the trials that were measured; None where none was."""
+    """Median over the trials that were measured; None where none was."""
     measured = values[np.isfinite(values)]
     return float(np.median(measured)) if len(measured) else None
 

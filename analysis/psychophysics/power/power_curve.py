@@ -17,6 +17,7 @@ from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule
 
 CONFIDENCE = 0.95
+"""Confidence of the intervals of power and type-1 error."""
 
 
 @dataclass(frozen=True, slots=True)

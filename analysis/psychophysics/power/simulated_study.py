@@ -48,7 +48,8 @@ class Crowd:
     criterion_drift_sd: float = 0.0
     """Standard deviation between people of the criterion's drift per 100 trials; the runs then come in random order."""
     unsure: float = 0.0
-    """All ask for the same trial again within so many standard errors of their criterion, see `Participant`."""
+    """Distance from the criterion, in standard errors, within which people ask for the same trial again; see
+    `Participant`."""
     repeats: int = 0
     """Most such repeats in a run."""
     delivery: FeltDelivery | None = None

@@ -16,6 +16,7 @@ from protocols.procedure.staircase import to_db
 MOST_TRIALS = 2000
 """A run is cut here: a guesser needs about 110 trials under the published rule, and 262 at the most in 500 runs."""
 SAME_DB = 1e-9
+"""Difference below which two levels are the same, rounding apart."""
 SUREST = (3.2, 25.0, 6.7)
 """t of each family where 1 - F is 1e-11 to 2e-11: beyond it no answer is wrong but by a lapse."""
 
@@ -75,7 +76,8 @@ class Participant(NamedTuple):
     trials_before: int = 0
     """Trials of the session before this run, from which a drifting criterion continues."""
     unsure: float = 0.0
-    """Asks for the same trial again where the average of all looks lies within so many standard errors."""
+    """Asks for the same trial again where the average of all presentations lies within this many standard errors of the
+    criterion."""
     repeats: int = 0
     """Most repeats in this run."""
     felt_1: FloatArray = AS_COMMANDED

@@ -25,8 +25,9 @@ class Bodies:
     ports: FloatArray
     """(n, r): the directions along which forces act; the driven axes first, then joints."""
     acts: tuple[AxisForce | JointForce, ...]
-    """One per force."""
+    """One per force: its law."""
     port: tuple[int, ...]
+    """One per force: index of the port at which it acts."""
     numbers: tuple[FloatArray, ...]
     """Parameters of each force's law."""
 
@@ -109,12 +110,12 @@ def simulate_bodies(
             rows_of_block = spare[: (end - first) * rows]
             np.matmul(drive[first * rows : end * rows], stepping.into, out=rows_of_block[:, :inner])
             stepping.run(rows_of_block, first)
-            seen = rows_of_block[::rows]
+            inputs = rows_of_block[::rows]
             # An acceleration shows the force of its very instant, not the last step's mean.
-            seen[0, inner:], seen[1:, inner:] = last[first - 1] if first else 0.0, last[first : end - 1]
-            np.matmul(seen, output, out=motion_rows[first:end])
+            inputs[0, inner:], inputs[1:, inner:] = last[first - 1] if first else 0.0, last[first : end - 1]
+            np.matmul(inputs, output, out=motion_rows[first:end])
             if motion:
-                added[first:end, list(ports)] = seen[:, len(stepping.outward) : inner]
+                added[first:end, list(ports)] = inputs[:, len(stepping.outward) : inner]
     return motion_rows, added
 
 
@@ -148,6 +149,8 @@ def _output_matrix(linear: LinearSteps, outward: FloatArray, ports: tuple[int, .
 
 
 def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
+    """The forces in the form of the compiled kernel: distinct laws once each; for every force the index of its law and
+    port, and the ranges of its parameters and of its memory. Raises ValueError for too many laws."""
     laws: list[object] = []
     places: list[tuple[int, ...]] = []
     used = kept = 0
@@ -157,7 +160,7 @@ def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
         places.append((laws.index(act.law), ports.index(port), used, used + len(numbers), kept, kept + act.memory))
         used, kept = used + len(numbers), kept + act.memory
     if len(laws) > LAWS:
-        raise ValueError(f"{len(laws)} different forces act at once; at most {LAWS} can be played")
+        raise ValueError(f"{len(laws)} different force laws act at once; simulate at most {LAWS}")
     return Forces(
         ports,
         tuple(law_address(law) for law in (*laws, *(no_force,) * (LAWS - len(laws)))),

@@ -25,6 +25,7 @@ PARTS = 12
 STUCK = 0.3
 """Travel per part, in units of z_max, that is fine enough for the bristle."""
 BENT = 1 - 1e-6
+"""Share of the full bristle force above which the bristle counts as fully bent (sliding)."""
 _VECTOR = types.float64[::1]
 
 

@@ -8,6 +8,7 @@ from equalizer.effects.simulation.reading_kernel import read_at
 from equalizer.signals.signal import FloatArray
 
 TAPS, PHASES = 32, 256
+"""Length of the interpolation filter in samples, and number of its tabulated fractions of a sample."""
 BETA = 8.0
 """Shape parameter of the Kaiser window: ripple of 1e-4 up to 0.42 of the sample rate."""
 

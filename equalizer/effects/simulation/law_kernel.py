@@ -36,6 +36,7 @@ PER_AXIS = 4
 CLOSE = 1e-7
 """Relative tolerance of a force that depends on the motion it causes."""
 TRIES = 60
+"""Most iterations of the root search (regula falsi and bisection in turn) for a law's force at the end of a step."""
 
 
 @njit(inline="always")

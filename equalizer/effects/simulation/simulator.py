@@ -71,7 +71,7 @@ def simulate_response(
     hold: Hold = Hold.ZERO_ORDER,
     measurement: Measurement | None = None,
 ) -> SimulationResult:
-    """As `simulate_mechanism`, faster: without the driven axes, whose arrays are (n, 0)."""
+    """Simulate the response as `simulate_mechanism` does, faster: without the driven axes, whose arrays are (n, 0)."""
     played = _simulate_motion(model, commands, (sample_rate_hz, hold), effects, axes=False)
     return _apply_sensor(model, played, sample_rate_hz, effects, measurement)
 
@@ -84,8 +84,8 @@ def simulate_windows(
     measurement: Measurement | None,
     restarts: Restarts,
 ) -> SimulationResult:
-    """As `simulate_mechanism`, restarted from given states. sampled: rate in Hz, and how commands move between
-    samples."""
+    """Simulate with `simulate_mechanism`, restarted from given states. sampled: rate in Hz, and how commands move
+    between samples."""
     return _apply_sensor(
         model, _simulate_motion(model, commands, sampled, effects, restarts=restarts), sampled[0], effects, measurement
     )

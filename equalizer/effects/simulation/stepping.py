@@ -1,4 +1,16 @@
-"""Time stepping of a linear structure in blocks of samples: unforced, or under motion-dependent forces."""
+"""Time stepping of a linear structure in blocks of samples: unforced, or under motion-dependent forces.
+
+Theory of operation. The structure M a + C v + K x = B u + F has the exact step of a command held over it,
+
+    s(t + h) = A s(t) + B_u u + B_F F,    A = exp(h [[0, I], [-M^-1 K, -M^-1 C]])
+
+`modal_form` puts A into 2 x 2 blocks, so that a step costs O(n) instead of O(n²). Without motion-dependent forces a
+whole sample is one step. With them F depends on the state within the step: each force law is evaluated at the position,
+velocity and acceleration of its port, corrected for its own effect (`per_newton`), step by step in compiled code
+(`mechanism_kernel`). Many samples are stepped per call, because a call of compiled code costs as much as many steps.
+
+Reference: Van Loan, IEEE Trans. Autom. Control 23:395 (1978) (integrals of the matrix exponential).
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -81,13 +93,13 @@ def forced_stepping(linear: LinearSteps, forces: Forces, steps: int, stride: int
     outward, inward = asked @ form.outward, (form.inward @ by_force).T
     step = (form.advance, _contiguous(outward), _contiguous(inward), _contiguous(per_newton.T))
     into = np.hstack([(form.inward @ linear.by_command).T, linear.motion_by_command[2 * r + where].T])
-    seen = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
+    commands = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
     state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(where))), forces.memory.copy()
 
     def run(rows: FloatArray, first: int) -> None:
         step_mechanism(
             forces.laws, forces.places, forces.numbers, memory, step, rows,
-            seen[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
+            commands[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
             linear.step_s,
         )  # fmt: skip
 

@@ -88,25 +88,25 @@ def _orthonormal_basis(columns: FloatArray) -> FloatArray:
 
 
 def likely_oscillators(
-    seen: MissingMass, axis: int, natural_hz: Sequence[float], damping_ratios: Sequence[float]
+    missing: MissingMass, axis: int, natural_hz: Sequence[float], damping_ratios: Sequence[float]
 ) -> list[AttachedOscillator]:
     """Oscillators of all damping ratios and natural frequencies, likeliest first: those with positive mass that explain
     more than chance, below the highest driven frequency. axis: index of the axis they are tied to."""
-    if not len(seen.frequency_hz):
+    if not len(missing.frequency_hz):
         return []
-    root = np.sqrt(np.maximum(seen.power, np.finfo(float).tiny))
-    wave = 2j * np.pi * seen.frequency_hz
+    root = np.sqrt(np.maximum(missing.power, np.finfo(float).tiny))
+    wave = 2j * np.pi * missing.frequency_hz
     linear = np.stack([np.ones_like(wave), 1 / wave, 1 / wave**2], axis=1) * root[:, None]
-    force = seen.cross / root[:, None]
+    force = missing.cross / root[:, None]
     aim = np.vstack([force.real, force.imag])
     linear = np.vstack([linear.real, linear.imag])
     beside = _orthonormal_basis(linear)
     alone = aim - beside @ (beside.T @ aim)
     power = max(float(alone[:, axis] @ alone[:, axis]), np.finfo(float).tiny)
-    natural = np.array([item for item in natural_hz if item < seen.frequency_hz[-1]])
+    natural = np.array([item for item in natural_hz if item < missing.frequency_hz[-1]])
     found = []
     for ratio in damping_ratios:
-        shape = oscillator_reaction(seen.frequency_hz[:, None], natural, ratio) * root[:, None]
+        shape = oscillator_reaction(missing.frequency_hz[:, None], natural, ratio) * root[:, None]
         shapes = np.vstack([shape.real, shape.imag])
         # Orthogonal to what the linear parameters explain: the least-squares fit of a shape is then independent of
         # them.
@@ -121,7 +121,7 @@ def likely_oscillators(
     return sorted((item for item in found if item.explained > CHANCE), key=lambda item: -item.explained)
 
 
-def subtract_oscillator(seen: MissingMass, each: AttachedOscillator) -> MissingMass:
+def subtract_oscillator(missing: MissingMass, each: AttachedOscillator) -> MissingMass:
     """The missing force less that of an oscillator."""
-    pull = seen.power * each.mass * oscillator_reaction(seen.frequency_hz, each.natural_hz, each.damping_ratio)
-    return MissingMass(seen.frequency_hz, seen.power, seen.cross - pull[:, None] * each.by_axis)
+    pull = missing.power * each.mass * oscillator_reaction(missing.frequency_hz, each.natural_hz, each.damping_ratio)
+    return MissingMass(missing.frequency_hz, missing.power, missing.cross - pull[:, None] * each.by_axis)

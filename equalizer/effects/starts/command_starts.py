@@ -15,6 +15,7 @@ SHIFTS = (0, 1)
 CLOSE = 3e-3
 """Relative tolerance of the golden-section search."""
 GOLDEN = (5**0.5 - 1) / 2
+"""Golden ratio less 1: the share by which golden-section search shrinks its interval."""
 
 
 def likeliest_value(

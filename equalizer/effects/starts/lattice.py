@@ -7,6 +7,7 @@ from equalizer.signals.signal import FloatArray
 CLOSE = 0.02
 """Shares of a step by which values may deviate from the lattice; single precision needs less."""
 NEARLY_ALL = 0.999
+"""Share of values that must lie on the lattice."""
 LEAST_VALUES, MOST_VALUES = 3, 0.2
 """Least number of different values that make a lattice; and most, as a share of the samples."""
 PEAK = 12.0
@@ -16,7 +17,7 @@ BIN_SHARE = 0.2
 
 
 def lattice_offset(values: FloatArray, step: float) -> float | None:
-    """Where the lattice of this step starts, between minus and plus half a step; None where values are not on one."""
+    """Offset of the lattice of this step, between minus and plus half a step; None where values are not on one."""
     if step <= 0:
         return None
     turn = np.exp(2j * np.pi * values / step)

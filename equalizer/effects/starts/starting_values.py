@@ -80,9 +80,9 @@ class PartialRegression:
         shapes = self._without(np.column_stack(laws))
         size = np.linalg.norm(shapes, axis=0)
         shapes = shapes / np.where(size > 0, size, 1.0)
-        seen = shapes.T @ self.force
-        strengths = np.asarray(np.linalg.lstsq(shapes.T @ shapes, seen, rcond=1e-9)[0], dtype=np.float64)
-        return LawFit(strengths / np.where(size > 0, size, 1.0), float(seen @ strengths) / self._power)
+        products = shapes.T @ self.force
+        strengths = np.asarray(np.linalg.lstsq(shapes.T @ shapes, products, rcond=1e-9)[0], dtype=np.float64)
+        return LawFit(strengths / np.where(size > 0, size, 1.0), float(products @ strengths) / self._power)
 
 
 def regress_beside_linear(motion: AxisMotion, constant: bool = True) -> PartialRegression:

@@ -63,24 +63,26 @@ def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -
     lines = response.of_lines(response.reliable)
     local = LocalPolynomial.over(lines, rule.neighbours, 2)
     smooth = local.apply(lines.response)
-    told = _is_above_noise(lines, local, smooth, rule)
-    if not told.any():
+    above_noise = _is_above_noise(lines, local, smooth, rule)
+    if not above_noise.any():
         raise ValueError(
             f"coupling cannot be judged: at no line is the noise small against {100 * rule.threshold:g} % of the "
             "response; record more periods, or with a stronger excitation"
         )
-    found = _find_onset(lines.frequency_hz[told], worst_coupling(smooth[told]), rule)
+    found = _find_onset(lines.frequency_hz[above_noise], worst_coupling(smooth[above_noise]), rule)
     if found is None:
         return CouplingOnset(None, None, False, rule.threshold, rule.sentence)
     near = lines.frequency_hz <= max(_HIGHEST_RESAMPLED * found, lines.frequency_hz[2 * rule.neighbours])
     known = bool(np.isfinite(lines.noise_variance).all())
-    drawn = _bootstrap_onsets(lines.of_lines(near), smooth[near], told[near], rule) if known else None
+    drawn = _bootstrap_onsets(lines.of_lines(near), smooth[near], above_noise[near], rule) if known else None
     interval = (
         None
         if drawn is None
         else _widen_by_resolution(_bias_corrected_interval(found, drawn), lines.frequency_hz, found)
     )
-    return CouplingOnset(found, interval, bool(found == lines.frequency_hz[told][0]), rule.threshold, rule.sentence)
+    return CouplingOnset(
+        found, interval, bool(found == lines.frequency_hz[above_noise][0]), rule.threshold, rule.sentence
+    )
 
 
 def _is_above_noise(
@@ -89,8 +91,8 @@ def _is_above_noise(
     """(lines,): where the smoothed noise is below a quarter of the threshold. Elsewhere noise alone may pass it."""
     noise = np.sqrt(np.nan_to_num(local.power(lines.noise_variance)))
     along = np.maximum(np.einsum("lii->li", np.abs(smooth)), np.finfo(np.float64).tiny)
-    told: BoolArray = (np.linalg.norm(noise, axis=1) / along).max(axis=1) < rule.threshold / 4
-    return told
+    above_noise: BoolArray = (np.linalg.norm(noise, axis=1) / along).max(axis=1) < rule.threshold / 4
+    return above_noise
 
 
 def _find_onset(frequency_hz: FloatArray, coupling: FloatArray, rule: OnsetRule) -> float | None:
@@ -117,7 +119,9 @@ def _interpolate_crossing(frequency_hz: FloatArray, coupling: FloatArray, first:
     return float(frequency_hz[first - 1] + share * (frequency_hz[first] - frequency_hz[first - 1]))
 
 
-def _bootstrap_onsets(lines: FrequencyResponse, smooth: ComplexArray, told: BoolArray, rule: OnsetRule) -> FloatArray:
+def _bootstrap_onsets(
+    lines: FrequencyResponse, smooth: ComplexArray, above_noise: BoolArray, rule: OnsetRule
+) -> FloatArray:
     """(draws,): onsets of a parametric bootstrap: noise of the measured size is added to the smoothed curve."""
     local = LocalPolynomial.over(lines, rule.neighbours, 2)
     size = np.sqrt(lines.noise_variance / 2)
@@ -126,7 +130,7 @@ def _bootstrap_onsets(lines: FrequencyResponse, smooth: ComplexArray, told: Bool
     for _ in range(rule.draws):
         noise = generator.standard_normal((2, *size.shape)) * size
         drawn = smooth + local.apply(noise[0] + 1j * noise[1])
-        onset = _find_onset(lines.frequency_hz[told], worst_coupling(drawn[told]), rule)
+        onset = _find_onset(lines.frequency_hz[above_noise], worst_coupling(drawn[above_noise]), rule)
         onsets.append(float(lines.frequency_hz[-1]) if onset is None else onset)
     return np.array(onsets)
 

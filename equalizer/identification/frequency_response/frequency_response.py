@@ -13,7 +13,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrequencyResponse:
-    """From the total command to the response, both as sampled: `response[k]` is taken just before `command[k]`."""
+    """Frequency response from the total command to the response, both as sampled: `response[k]` is taken just before
+    `command[k]`."""
 
     frequency_hz: FloatArray
     """(lines,), rising."""

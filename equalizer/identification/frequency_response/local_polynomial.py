@@ -32,7 +32,9 @@ class LocalPolynomial:
         if order < 0 or taken < order + 2:
             raise ValueError(f"a polynomial of order {order} needs more than {taken} lines; let neighbours be larger")
         if lines < taken:
-            raise ValueError(f"smoothing takes {taken} lines at a time, but there are {lines}")
+            raise ValueError(
+                f"smoothing takes {taken} lines at a time, but there are {lines}; widen the band, or lower the degree"
+            )
         window = np.clip(np.arange(lines) - neighbours, 0, lines - taken)[:, None] + np.arange(taken)
         weight = _weights(response)[window]
         powers = _powers(response.frequency_hz, window, order)

@@ -12,6 +12,7 @@ from equalizer.signals.signal import FloatArray
 SETTLING_S = 0.5
 """Settling time after the last excitation, before samples count as rest."""
 _REST_WINDOW_S = 0.5
+"""Length of a window at rest."""
 _THIRD_DIFFERENCE_GAIN = 20.0
 """1² + 3² + 3² + 1²: ratio of the variance of a third difference to that of a line."""
 

@@ -6,6 +6,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _STARTING_ROUNDS, _NEWTON_ROUNDS = 3, 8
+"""Reweighted linear fits that give a start, and Newton steps from it."""
 
 
 def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[FloatArray, FloatArray]:

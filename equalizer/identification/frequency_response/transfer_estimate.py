@@ -42,8 +42,8 @@ class EstimateSettings:
 
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
-    """From total command to response. Raises TransferEstimateError where the recordings do not belong together, or
-    hold fewer independent experiments than there are inputs."""
+    """Estimate the transfer function from total command to response. Raises TransferEstimateError where the recordings
+    do not belong together, or hold fewer independent experiments than there are inputs."""
     settings = settings or EstimateSettings()
     _check_alike(recordings)
     found = _collect_experiments(recordings, settings)
@@ -139,7 +139,7 @@ def _join_parts(
 
 def _check_alike(recordings: Sequence[Recording]) -> None:
     if not recordings:
-        raise TransferEstimateError("there is no recording to estimate from")
+        raise TransferEstimateError("there is no recording to estimate from; give at least one")
     first = recordings[0]
     for number, other in enumerate(recordings[1:], start=2):
         for what, wanted, found in (

@@ -53,6 +53,7 @@ EXCITED = 1e-2
 MOST_LINES = 2000
 """Most lines of one segment that does not repeat: of more, every second, third... is used."""
 _NOISE_LINES = 9
+"""Lines over which noise and signal are averaged."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,6 +18,7 @@ LARGEST = 0.25
 """Largest scatter that is counted as noise, relative to a channel's largest response near a line. Segments differ more
 where resonances shift with the level, and those lines contain most of the motion."""
 _LINES = 9
+"""Lines over which the misfit is averaged."""
 
 
 def add_scatter_noise(segments: Sequence[SegmentLines]) -> tuple[SegmentLines, ...]:
@@ -66,9 +67,11 @@ def _scatter(alike: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArra
 
 
 LEFT_OUT_EVERY = 4
+"""Every fourth line is held out for the choice of the order."""
 _RUN_AWAY = 1e120
 """Largest amplitude of a transient's spectrum: the square of a larger one overflows."""
 _STEP = 1e-6
+"""Relative step of finite differences."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +97,7 @@ class LineGroup:
         return self.of_lines(~self.left_out)
 
     def thin_out(self, most: int) -> "LineGroup":
-        """At most `most` lines: every second, third... one, with held-out lines chosen anew."""
+        """Keep at most `most` lines: every second, third, ... line, with held-out lines chosen anew."""
         every = -(-len(self.frequency_hz) // most)
         part = self.of_lines(np.arange(len(self.frequency_hz)) % every == 0)
         return replace(part, left_out=_every_fourth_line(len(part.frequency_hz)))

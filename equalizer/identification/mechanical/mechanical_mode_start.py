@@ -19,8 +19,11 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _GRID = 60
+"""Number of resonance frequencies that are tried."""
 _RATIOS = (0.01, 0.05, 0.25)
+"""Damping ratios that are tried."""
 _MOST_ROWS = 6000
+"""Most rows of the regression: more lines are thinned out."""
 _SMALL_START = 0.02
 """Root of the mode's mass over the whole mass, where the linear estimate gives none."""
 

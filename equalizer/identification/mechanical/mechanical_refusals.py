@@ -13,6 +13,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
 LEAST_SAMPLES = 64
+"""Fewest samples of a recording."""
 ALL_NOISE = 0.97
 """Relative simulation error above which a model explains less than a twentieth of the response's power."""
 
@@ -20,7 +21,7 @@ ALL_NOISE = 0.97
 def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
     """Check the recordings before a fit. Raises MechanicalFitRefused."""
     if not recordings:
-        raise MechanicalFitRefused("there is no recording to fit a model to")
+        raise MechanicalFitRefused("there is no recording to fit a model to; give at least one")
     first = recordings[0]
     for number, other in enumerate(recordings[1:], start=2):
         for what, each, found in (
@@ -56,9 +57,14 @@ def _refuse_samples(recordings: Sequence[Recording]) -> None:
             columns = [signal.samples[:, channel] for signal in signals]
             finite = [column[np.isfinite(column)] for column in columns]
             if not any(len(column) for column in finite):
-                raise MechanicalFitRefused(f"{side} {name} holds no number, only missing values")
+                raise MechanicalFitRefused(
+                    f"{side} {name} holds no number, only missing values; leave it out, or import it again"
+                )
             if all(not len(column) or np.ptp(column) == 0 for column in finite):
-                raise MechanicalFitRefused(f"{side} {name} is constant throughout, so nothing can be told from it")
+                raise MechanicalFitRefused(
+                    f"{side} {name} is constant throughout, so nothing can be told from it; "
+                    "leave it out, or record it driven"
+                )
 
 
 def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
@@ -79,8 +85,8 @@ def refuse_unstable(final: RefinedFit[Structure] | RefinedFit[ModalStructure]) -
     fastest = float(form.poles.real.max())
     if fastest > 1e-3 * final.structure.speed_scale:
         raise MechanicalFitRefused(
-            f"the best fit is unstable (it grows e-fold in {1 / fastest:.3g} s): a feedback in the command that was "
-            "not recorded, or a polarity that changes"
+            f"the best fit is unstable (it grows e-fold in {1 / fastest:.3g} s): look for a feedback in the command "
+            "that was not recorded, or a polarity that changes"
         )
 
 

@@ -13,7 +13,9 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _LEAST_EIGENVALUE = 0.05
+"""Least eigenvalue of the starting mass matrix, relative to the largest."""
 _DELAYS = 33
+"""Number of delays that are tried."""
 _MOST_DELAY_CYCLES = 8.0
 """Longest delay that is tried, in periods of the highest line."""
 

@@ -51,12 +51,17 @@ def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: 
 
 
 _WIDEST_LOG = 12.0
+"""Bound of the logarithms of masses, relative to their scale."""
 _FARTHEST_MODE = 4.0
 """Largest ratio of a mode's frequency to the nearer end of the band, outside it."""
 _LARGEST_TURN = 0.3
+"""Largest rotation of the sensor, rad."""
 _MOST_DELAY_SAMPLES = 200.0
+"""Largest delay of the command, samples."""
 _WIDEST_JOINT_LOG = 2.5
+"""Bound of the logarithms of the joint's parameters around their start."""
 _JOINT_LOSS = 0.05
+"""Starting loss factor of the joint."""
 
 
 @dataclass(frozen=True, eq=False)

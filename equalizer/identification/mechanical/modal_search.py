@@ -14,9 +14,13 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _GRID = 80
+"""Number of frequencies that are tried, on a logarithmic grid."""
 _RATIOS = (0.01, 0.04, 0.16, 0.64, 4.0)
+"""Damping ratios that are tried; above 1 the mode is overdamped."""
 _STEP = 1e-6
+"""Step of finite differences, in logarithms."""
 _MOST_DELAY_SAMPLES = 20.0
+"""Largest delay of the command, samples."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,7 +11,9 @@ from equalizer.signals.signal import FloatArray
 _WIDEST = 10.0
 """Ratio by which a mode may lie outside the band."""
 _LARGEST_RATIO = 100.0
+"""Largest damping ratio."""
 _WEAKEST = 1e-9
+"""Least strength of a mode, relative to the strongest."""
 _SHARE = 0.5
 _ALIKE = 1.5
 """Frequencies within this ratio of the slowest are those of the rigid body."""

@@ -22,11 +22,13 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
 
 LINES_PER_BIN = 5
+"""Lines that are averaged for the first refinement, in a narrow band."""
 OCTAVE_SHARE = 1 / 40
 """Width of a bin of a wide band."""
 LARGEST_GAIN = 100.0
 """Largest gain outside the band over that inside: above it, the model fits by cancellation of large modes."""
 MOST_STEPS, LAST_STEPS = (60, 20, 20), 4
+"""Steps of the refinement on averaged lines, by pass, and on all lines at the end."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -83,9 +83,9 @@ def _past_and_future(record: FloatArray, inputs: int, horizon: int) -> FloatArra
 def poles_and_shapes(observed: FloatArray, outputs: int, order: int, factor: int, radius: float) -> ModalForm:
     """Modal form at the full rate: a pole of the decimated records becomes its factor-th root. radius: largest pole at
     the full rate."""
-    seen = observed[:, :order]
-    values, vectors = np.linalg.eig(np.linalg.lstsq(seen[:-outputs], seen[outputs:], rcond=None)[0])
+    observability = observed[:, :order]
+    values, vectors = np.linalg.eig(np.linalg.lstsq(observability[:-outputs], observability[outputs:], rcond=None)[0])
     slow: ComplexArray = stabilise_poles(values, radius**factor)
     # A negative real pole has no real root; the positive pole with the same decay is used.
     turned = np.where((slow.imag == 0) & (slow.real < 0), -slow, slow)
-    return from_poles(stabilise_poles(turned ** (1 / factor), radius), seen[:outputs] @ vectors)
+    return from_poles(stabilise_poles(turned ** (1 / factor), radius), observability[:outputs] @ vectors)

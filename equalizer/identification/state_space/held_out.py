@@ -38,10 +38,10 @@ def validate_on_test(model: IdentifiedModel, recordings: Sequence[Recording]) ->
         return None
     power = sum(part.power for part in parts)
     noises = [part.noise_power for part in parts]
-    told = [noise for noise in noises if noise is not None]
+    known_noise = [noise for noise in noises if noise is not None]
     return HeldOut(
         error=float(np.sqrt(sum(part.error_power for part in parts) / power)),
-        noise=float(np.sqrt(sum(told) / power)) if len(told) == len(noises) else None,
+        noise=float(np.sqrt(sum(known_noise) / power)) if len(known_noise) == len(noises) else None,
         seconds=sum(part.seconds for part in parts),
     )
 

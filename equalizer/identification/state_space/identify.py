@@ -1,11 +1,30 @@
-"""Identification of a state-space model from measured frequency responses: starts, refinement, choice, uncertainty."""
+"""Identification of a state-space model from measured frequency responses: starts, refinement, choice, uncertainty.
+
+Theory of operation. The measured response G(f) of each line f has noise of known variance s(f)² per entry. The model
+
+    G_M(f) = C (zI - A)^-1 B + D,    z = exp(2 pi i f / rate)
+
+minimises the weighted squared residual sum of |G - G_M|² / s², the maximum-likelihood estimate for Gaussian noise.
+
+1. Starts. Subspace identification in the frequency domain (`warped_subspace`) for several horizons, and canonical
+   variate analysis of the time records (`canonical_variate`), because the cost has many local minima.
+2. Refinement. Each start is refined by Levenberg-Marquardt steps over poles and output shapes (`refinement`). All
+   poles stay inside a circle that stands for the longest decay the recordings can show: the model is always stable.
+3. Choice. Least cost among those without a large gain outside the band (`candidates`).
+4. Relaxation. Where the bound on the decay costs significantly, single poles may decay more slowly (`relaxed_poles`).
+5. Uncertainty. A parametric bootstrap refits draws of the noise (`bootstrap`); the misfit is what exceeds the noise.
+
+References: McKelvey, Akçay and Ljung, IEEE Trans. Autom. Control 41:960 (1996); Pintelon and Schoukens, System
+Identification (2012), chapters 2 and 9.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
+from equalizer.identification.state_space.bootstrap import parameter_draws, scatter_of_draws
 from equalizer.identification.state_space.candidates import (
     Candidate,
     Start,
@@ -18,61 +37,16 @@ from equalizer.identification.state_space.candidates import (
 )
 from equalizer.identification.state_space.misfit import Misfit, count_unknowns, misfit_of
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
-from equalizer.identification.state_space.refinement import FittedForm, refine
 from equalizer.identification.state_space.refusals import IdentificationRefused, require_lines
 from equalizer.identification.state_space.relaxed_poles import RelaxedFit, SlowPole, relax_poles, retighten, slow_poles
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.identification.state_space.stable_poles import Radius
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summarised, Summary
-
-STEPS = 3
-
-
-def parameter_draws(
-    fitted: FittedForm, lines: WeightedLines, radius: Radius, noise_factor: float, draws: int, seed: int
-) -> FloatArray:
-    """Parametric bootstrap (draws, k), in the order of `IdentifiedModel.parameters`: each a fit to another draw of the
-    noise.
-
-    A covariance from the Jacobian is not used: with an order above what the band shows, the response depends on some
-    directions of the parameters only beyond first order, so that draws from a normal distribution are unstable models.
-    Refitting keeps every draw within the decay bound, at the cost of a few steps each (Efron and Tibshirani 1993).
-
-    lines: the fitted lines, binned or not; noise_factor: assumed noise over that of the weights, above 1 where
-    residuals exceed the noise.
-    """
-    random = np.random.default_rng(seed)
-    modelled = fitted.response(lines.z)
-    deviation = noise_factor / lines.weight / np.sqrt(2)
-    rows = []
-    for _ in range(draws):
-        real, imaginary = random.standard_normal((2, *modelled.shape))
-        noisy = replace(lines, response=modelled + deviation * (real + 1j * imaginary))
-        drawn = refine(fitted.form, noisy, radius, STEPS)
-        parts = (drawn.form.state_matrix, drawn.B, drawn.form.C, drawn.D)
-        rows.append(np.concatenate([part.ravel() for part in parts]))
-    return np.array(rows)
-
-
-def response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> FloatArray:
-    """Standard error |δG| of each entry, (lines, p, m), from the model's samples. Raises ValueError without them."""
-    if model.samples is None:
-        raise ValueError("the model holds no samples of its uncertainty; identify it again with draws > 0")
-    middle = model_response(model, frequency_hz)
-    squares = [np.abs(model_response(model.with_parameters(row), frequency_hz) - middle) ** 2 for row in model.samples]
-    return np.asarray(np.sqrt(np.mean(squares, axis=0)), dtype=np.float64)
-
 
 FIRST_SEARCH = 0.8
 """Share of the progress that is reported for the first search; poles are relaxed in the rest."""
-BAND_POINTS = 200
-WIDTHS = np.sinh(np.linspace(-4, 4, 41))
-"""Frequencies about a slow pole, in half-widths of its peak: dense at the peak, up to 27 away."""
 SAMPLED_BEFORE_WRITTEN = 1.0
 """Delay of one sample: a response is read just before its row's command is written."""
 
@@ -218,7 +192,7 @@ def _assess_model(
         cost=cost,
         rms_relative_error=float(np.sqrt((error**2).mean())),
         worst_relative_error=float(error.max()),
-        scatter=(scatter := _scatter(model, lines.frequency_hz[inside], slow)),
+        scatter=(scatter := scatter_of_draws(model, lines.frequency_hz[inside], slow)),
         misfit=misfit,
         expected_error=None if scatter is None else float(np.hypot(scatter, misfit.most)),
         lines=int(inside.sum()),
@@ -230,24 +204,12 @@ def _assess_model(
     )
 
 
-def _scatter(model: IdentifiedModel, frequency_hz: FloatArray, slow: tuple[SlowPole, ...]) -> float | None:
-    """Relative scatter as an integral over the band: also between lines, where a narrow resonance has its peak."""
-    if model.samples is None or len(frequency_hz) < 2:
-        return None
-    low, high = frequency_hz[0], frequency_hz[-1]
-    peaks = [pole.frequency_hz + WIDTHS / (2 * np.pi * pole.decay_s) for pole in slow]
-    grid = np.unique(np.clip(np.concatenate([np.linspace(low, high, BAND_POINTS), *peaks]), low, high))
-    each_hz = np.gradient(grid)[:, None, None]
-    size = np.sqrt((each_hz * np.abs(model_response(model, grid)) ** 2).sum())
-    return float(np.sqrt((each_hz * response_deviation(model, grid) ** 2).sum()) / size)
-
-
 def _refuse_foreign(records: tuple[Recording, ...], like: FrequencyResponse) -> None:
     for record in records:
-        told = (record.sample_rate_hz, record.command.channels, record.response.channels)
-        if told != (like.sample_rate_hz, like.input_channels, like.output_channels):
+        form = (record.sample_rate_hz, record.command.channels, record.response.channels)
+        if form != (like.sample_rate_hz, like.input_channels, like.output_channels):
             raise IdentificationRefused(
-                f"a record of {', '.join(told[2])} per {', '.join(told[1])} at {told[0]:g} Hz does not belong to a "
+                f"a record of {', '.join(form[2])} per {', '.join(form[1])} at {form[0]:g} Hz does not belong to a "
                 f"response of {', '.join(like.output_channels)} per {', '.join(like.input_channels)} at "
                 f"{like.sample_rate_hz:g} Hz; give the records that the response was estimated from"
             )

@@ -20,6 +20,7 @@ from equalizer.signals.recording import Recording
 HEARD_S = 1.0
 """Time constant above which the transient of a start disturbs the estimate, which leaves out its first 5 s."""
 MOST_ROUNDS = 8
+"""Most repetitions in which slow transients are subtracted and the model is refined."""
 SETTLED = 1e-4
 """Relative change of the slowest decay between rounds below which no further round is made."""
 SMOOTHED = (

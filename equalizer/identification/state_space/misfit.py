@@ -31,6 +31,7 @@ class Misfit:
 
 
 ONE_SIDED_95 = 1.645
+"""Quantile of the normal distribution at 95 %."""
 
 
 def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, unknowns: int) -> Misfit:

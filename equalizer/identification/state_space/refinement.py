@@ -155,12 +155,12 @@ def _jacobian(point: _Point, lines: WeightedLines) -> FloatArray:
     p, n = form.C.shape
     blocks = n // 2
     B = point.solved[:, :n].T
-    seen, driven = form.from_states(z), form.to_states(z, B)
+    outputs, driven = form.from_states(z), form.to_states(z, B)
     m = B.shape[1]
     rows = np.zeros((m, len(z), p, 2 * blocks + p * n), dtype=np.complex128)
-    both = np.einsum("lis,lsj->jlis", seen, driven)
+    both = np.einsum("lis,lsj->jlis", outputs, driven)
     rows[..., :blocks] = both[..., ::2] + both[..., 1::2]
-    rows[..., blocks : 2 * blocks] = np.einsum("lis,lsj->jlis", seen[:, :, 1::2], driven[:, ::2])
+    rows[..., blocks : 2 * blocks] = np.einsum("lis,lsj->jlis", outputs[:, :, 1::2], driven[:, ::2])
     for i in range(p):
         rows[:, :, i, 2 * blocks + i * n : 2 * blocks + (i + 1) * n] = driven.transpose(2, 0, 1)
     rows *= lines.weight.transpose(2, 0, 1)[..., None]

@@ -67,8 +67,8 @@ def weight_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, f
 
 
 def _noise_variance(estimate: FrequencyResponse) -> FloatArray:
-    told = estimate.noise_variance
-    return np.where(np.isfinite(told), told, scatter_variance(estimate.response))
+    variance = estimate.noise_variance
+    return np.where(np.isfinite(variance), variance, scatter_variance(estimate.response))
 
 
 def scatter_variance(response: ComplexArray) -> FloatArray:

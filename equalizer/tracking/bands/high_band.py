@@ -20,6 +20,7 @@ SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
 """Weight of |force|² beside |G|²: a smaller one amplifies noise at antiresonances, with a larger one weak lines fall
 short."""
 WEIGHT = 1e-3
+"""Default weight of the force against the error, (m/s² per N)²."""
 DIRECTIONS = 64
 """Number of force directions tried over the half sphere besides the axes."""
 

@@ -34,9 +34,11 @@ RIGID_OCTAVES = 0.6
 """Width in octaves of the lowest part of the narrow band to which the rigid model is fitted: below the first
 resonance."""
 RIGID_LINES = 30
+"""Lines at which the rigid model is compared."""
 LEAST_REACH = 2.0
 """Least ratio of the two bands' upper ends: a high band with a single direction needs an octave."""
 BINS_PER_OCTAVE = 6
+"""Bins per octave in which two models are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +56,8 @@ class TwoModels:
                 f"begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one begin "
                 "above 2 Hz"
             )
-        told = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
-        if told[0] != told[1] and None not in told[0] + told[1]:
+        origins = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
+        if origins[0] != origins[1] and None not in origins[0] + origins[1]:
             raise ValueError(
                 f"the narrower one was made {_describe_conditions(self.narrow)}, the wider one "
                 f"{_describe_conditions(self.wide)}: two bands must be of one device, held and driven alike"

@@ -8,6 +8,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 WORST_CONDITION = 1e6
+"""Largest condition number of the response that is inverted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +46,9 @@ def fit_rigid_model(
     if len(frequency_hz) < 2 or not (frequency_hz > 0).all():
         raise ValueError("a rigid model needs the response at two or more frequencies above zero")
     if np.linalg.cond(response).max() > WORST_CONDITION:
-        raise ValueError("the response at a line does not move all axes, so that it has no inverse")
+        raise ValueError(
+            "the response at a line does not move all axes, so that it has no inverse; identify with all axes driven"
+        )
     m, s = response.shape[1], 2j * np.pi * frequency_hz
     # A held command acts half a sample late on average, on any device.
     late = np.exp(-s * (delay_s + 0.5 / sample_rate_hz))[:, None, None]

@@ -91,11 +91,11 @@ def compensate(
 def along_axes(motion: PlannedMotion, physics: MechanicalModel) -> PlannedMotion:
     """Motion along the driven axes, on which the effects act, from that counted by the responses: the signs differ
     where a model's input or output matrix says so."""
-    seen = physics.output @ driven_axes(physics)
+    gains = physics.output @ driven_axes(physics)
     columns = motion.position.shape[1]
-    if min(seen.shape) < columns:
+    if min(gains.shape) < columns:
         return motion
-    way = np.where(np.diagonal(seen)[:columns] < 0, -1.0, 1.0)
+    way = np.where(np.diagonal(gains)[:columns] < 0, -1.0, 1.0)
     return PlannedMotion(motion.position * way, motion.velocity * way, motion.acceleration * way)
 
 

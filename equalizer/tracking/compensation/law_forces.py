@@ -82,7 +82,9 @@ def invert_command_map(law: Law, meant: FloatArray) -> FloatArray:
     commands = np.linspace(-span, span, TABLE)
     forces = evaluate(law, {law.variables[0]: commands}, PLAYED)
     if not (np.isfinite(forces).all() and (np.diff(forces) >= 0).all()):
-        raise ValueError(f"the command map {law.text} goes up and down, so it cannot be undone")
+        raise ValueError(
+            f"the command map {law.text} goes up and down, so it cannot be undone; leave it out of what is compensated"
+        )
     return np.asarray(np.interp(meant, forces, commands))
 
 

@@ -26,6 +26,7 @@ HIGHEST_SHARE = 3.0
 """Upper end of the motion's band over that of the excitation, because friction has harmonics; and its lower end
 likewise."""
 LOWEST_SHARE = 0.75
+"""Lower end of the compared band, relative to the lowest driven frequency."""
 
 
 def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz: tuple[float, float]) -> Recording:

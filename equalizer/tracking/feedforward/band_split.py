@@ -16,6 +16,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 STOPBAND_DB = 60.0
+"""Attenuation of the filters outside their band."""
 CAUSAL_ORDER = 3
 """Odd, so that both sides of a crossover fall off alike: 12 dB per octave."""
 
@@ -26,7 +27,7 @@ class BandEdges:
     end."""
 
     low_hz: float | None = 4.0
-    """By default one hertz below the model's band (5 Hz), so that the model plays the whole band."""
+    """Lower band edge. The default is 1 Hz below the model's band (5 Hz), so that the model plays the whole band."""
     high_hz: float | None = 36.0
 
     def __post_init__(self) -> None:

@@ -34,7 +34,7 @@ class Identity:
 
     def periodic(self, wanted: Signal) -> Signal:
         if wanted.quantity != "force":
-            raise ValueError(f"without an equalizer only a force can be played, not {wanted.quantity}")
+            raise ValueError(f"without an equalizer only a force can be played, not {wanted.quantity}; give a model")
         return wanted
 
     def onset(self, wanted: Signal, envelope: FloatArray) -> None:

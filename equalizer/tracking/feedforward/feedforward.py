@@ -82,7 +82,10 @@ def feedforward(model: IdentifiedModel, wanted: Signal, settings: FeedforwardSet
     inside = extract_band(model, wanted.samples)
     if not np.linalg.norm(inside) > LEAKED * np.linalg.norm(wanted.samples):
         low, high = model.band_hz
-        raise TrackingError(f"nothing is wanted between {low:g} and {high:g} Hz, the model's band")
+        raise TrackingError(
+            f"nothing is wanted between {low:g} and {high:g} Hz, the model's band; "
+            "give a trajectory within it, or a model of its band"
+        )
     forces, loss = solve_causally(problem, inside, settings)
     peaks = require_under_cap(forces, settings.cap_n, model.sample_rate_hz)
     predicted = simulate_from_rest(problem, forces)

@@ -23,7 +23,7 @@ class ModelEqualizer:
 
     def __post_init__(self) -> None:
         if self.model.spectral_radius >= 1:
-            raise ValueError("the model is not stable, so nothing can be played through it")
+            raise ValueError("the model is not stable, so nothing can be played through it; identify it again")
 
     @property
     def name(self) -> str:

@@ -75,7 +75,10 @@ def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
 def check_wanted(model: IdentifiedModel, wanted: Signal) -> None:
     """Raises ValueError for a signal whose rate, channels or units are not the model's."""
     if wanted.sample_rate_hz != model.sample_rate_hz:
-        raise ValueError(f"the model runs at {model.sample_rate_hz:g} Hz, not at {wanted.sample_rate_hz:g} Hz")
+        raise ValueError(
+            f"the model runs at {model.sample_rate_hz:g} Hz, not at {wanted.sample_rate_hz:g} Hz; "
+            "resample what is wanted"
+        )
     p = model.C.shape[0]
     if wanted.samples.shape[1] != p:
         raise ValueError(f"the model has {p} outputs, but {wanted.samples.shape[1]} are wanted")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray, Signal
 
 STEP_TOLERANCE = 0.01
@@ -14,12 +15,8 @@ RATE_TOLERANCE = 1e-5
 """Relative distance to a whole number of hertz to which a rate is rounded, because printed time stamps are rounded."""
 
 
-class TableError(ValueError):
+class TableError(ListedProblemsError):
     """A table that cannot be used. `problems`: one sentence each, with the line."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 @dataclass(frozen=True, slots=True)

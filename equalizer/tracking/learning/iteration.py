@@ -140,11 +140,15 @@ def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationS
     first forces are above the cap, or what is wanted has nothing in the band."""
     if repetition.level == 0:
         low, high = repetition.band_hz
-        raise ValueError(f"what is wanted has nothing in the band of {low:g} to {high:g} Hz")
+        raise ValueError(
+            f"what is wanted has nothing in the band of {low:g} to {high:g} Hz; give a trajectory within it"
+        )
     forces = repetition.invert(repetition.wanted) if first is None else np.asarray(first, dtype=np.float64)
     peak = float(np.linalg.norm(forces, axis=1).max())
     if repetition.cap is not None and peak > repetition.cap:
-        raise ValueError(f"the first forces reach {peak:.4g} N, but the cap is {repetition.cap:g} N")
+        raise ValueError(
+            f"the first forces reach {peak:.4g} N, but the cap is {repetition.cap:g} N; scale the trajectory"
+        )
     missing = np.zeros_like(repetition.wanted)
     return IterationState(repetition, forces, Verdict.CONTINUE, forces, np.inf, missing, repetition.noise_floor)
 

@@ -19,7 +19,9 @@ from equalizer.tracking.lqr.lqr_kernel import simulate
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, require_trajectory
 
 OVER_RELAXATION = 1.7
+"""Over-relaxation of ADMM; 1.5 to 1.8 converges fastest (Boyd and others 2011, section 3.4.3)."""
 ROUNDS_BETWEEN_TUNING = 25
+"""Iterations between changes of ADMM's penalty: each change costs a Riccati recursion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +104,8 @@ def track_under_cap(
     alone = force_peaks(there, require_cap(cap_n))
     if not alone.fits:
         raise TrackingError(
-            f"the other forces alone reach {alone.peak_n:.3g} N at row {alone.at_sample}, above the cap of {cap_n:g} N"
+            f"the other forces alone reach {alone.peak_n:.3g} N at row {alone.at_sample}, above the cap of {cap_n:g} "
+            "N; lower them, or raise the cap"
         )
     task = _CappedTask(problem, r, there, cap_n)
     free = track(stored_gains(problem, len(r)), r)

@@ -65,7 +65,10 @@ def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatA
     p, rate_hz, band_hz = problem.outputs, problem.sample_rate_hz, problem.band_hz
     level = float(np.linalg.norm(band_spectrum(recording[:, np.newaxis], rate_hz, band_hz)))
     if not level > 0:
-        raise TrackingError(f"the recording has nothing between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band")
+        raise TrackingError(
+            f"the recording has nothing between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band; "
+            "give a transient with content there"
+        )
     wanted = every_normal(recording, p)
     along = [basis.predicted_response(axis) - wanted[i] for i, axis in enumerate(np.eye(p))]
     lines = np.array([band_spectrum(each, rate_hz, band_hz).ravel() for each in along]) / level

@@ -42,7 +42,7 @@ def force_peaks(forces: FloatArray, cap_n: float) -> Peaks:
     require_cap(cap_n)
     lengths = np.linalg.norm(forces, axis=1)
     if not np.isfinite(lengths).all():
-        raise ValueError("forces hold values that are not finite numbers")
+        raise ValueError("forces hold values that are not finite numbers; check the model and the trajectory")
     if not len(lengths):
         return Peaks(cap_n, 0.0, 0, 0.0)
     return Peaks(cap_n, float(lengths.max()), int(lengths.argmax()), float((lengths > cap_n).mean()))

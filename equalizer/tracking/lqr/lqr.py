@@ -1,7 +1,24 @@
 """Finite-horizon linear-quadratic tracking: feedforward forces from gains that are computed once.
 
+Theory of operation. The forces u minimise, for the model x' = A x + B u, y = C x + D u (x' of the next sample),
+
+    J = sum over k < N of (y_k - r_k)' Q (y_k - r_k) + u_k' R u_k, plus (x_N - x_f)' P_N (x_N - x_f)
+
+By dynamic programming the cost from sample k on is x' P_k x - 2 x' v_k + a constant, with, backwards in time,
+
+    H_k = R + D'Q D + B' P_{k+1} B              W_k = D'Q C + B' P_{k+1} A              K_k = H_k^-1 W_k
+    P_k = C'Q C + A' P_{k+1} A - W_k' K_k       v_k = (C - D K_k)' Q r_k + (A - B K_k)' v_{k+1},  v_N = P_N x_f
+    u_k = g_k - K_k x_k                         g_k = H_k^-1 (D'Q r_k + B' v_{k+1})
+
+P, H and K do not depend on the trajectory r (`riccati`): `stored_gains` computes them once for a length N. For each
+trajectory, one backward pass gives v and g (`costate_feedforward`), one forward pass simulates the model and gives the
+forces (`track`). Both passes are linear in r, which `rotation` uses.
+
 No measured signal is fed back. The gains act on the state of the simulated model: leaving out K x, as "feedback set to
 zero" could be read, gives an error of about the size of the trajectory.
+
+References: Bryson and Ho, Applied Optimal Control (1975), chapter 5; Anderson and Moore, Optimal Control: Linear
+Quadratic Methods (1990), chapter 4. `toeplitz` computes the same forces by one dense least-squares problem.
 """
 
 from dataclasses import dataclass

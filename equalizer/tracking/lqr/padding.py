@@ -83,7 +83,10 @@ def band_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: 
     """
     off, level = band_spectrum(played - wanted, rate_hz, band_hz), band_spectrum(wanted, rate_hz, band_hz)
     if not np.abs(level).max(initial=0.0) > 0:
-        raise TrackingError(f"nothing is wanted between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band")
+        raise TrackingError(
+            f"nothing is wanted between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band; "
+            "give a trajectory within it, or a model of its band"
+        )
     return float(np.linalg.norm(off) / np.linalg.norm(level))
 
 

@@ -86,8 +86,8 @@ def preview_loss(problem: TrackingProblem, preview_samples: int) -> PreviewLoss:
     lines_hz = np.linspace(low, high, max(2, round((high - low) / LINE_HZ) + 1))
     z = np.exp(2j * np.pi * lines_hz / problem.sample_rate_hz)
     played = _closed_response(problem, tracker.K, z)
-    seen = np.einsum("lj,jmp->lmp", z[:, np.newaxis] ** np.arange(len(tracker)), tracker.ahead)
-    return PreviewLoss(_relative_error(played @ seen), _relative_error(played @ _full_preview(problem, z)))
+    response = np.einsum("lj,jmp->lmp", z[:, np.newaxis] ** np.arange(len(tracker)), tracker.ahead)
+    return PreviewLoss(_relative_error(played @ response), _relative_error(played @ _full_preview(problem, z)))
 
 
 def _closed_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -141,7 +141,7 @@ def require_trajectory(problem: TrackingProblem, wanted: FloatArray) -> FloatArr
     if r.ndim != 2 or r.shape[1] != problem.outputs or not len(r):
         raise TrackingError(f"what is wanted has shape {r.shape}; this problem takes (N, {problem.outputs}), N >= 1")
     if not np.isfinite(r).all():
-        raise TrackingError("what is wanted holds values that are not finite numbers")
+        raise TrackingError("what is wanted holds values that are not finite numbers; fill the gaps first")
     return r
 
 

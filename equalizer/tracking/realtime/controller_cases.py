@@ -38,10 +38,8 @@ class ControllerCases:
 
 
 def controller_cases(controller: RealtimeController, seed: int = 1) -> ControllerCases:
-    """As many ticks as the transient has rows and some after its end.
-
-    Raises TrackingError where a way gives no force at all: nothing could be compared.
-    """
+    """Compute reference inputs and forces: as many ticks as the transient has rows and some after its end. Raises
+    TrackingError where one of the two ways gives no force at all: nothing could be compared."""
     draw, p = np.random.default_rng(seed), controller.problem.outputs
     ticks = len(controller.transient) + 50
     rotations = np.cumsum(draw.standard_normal((ticks, p, p)), axis=0)
@@ -56,5 +54,7 @@ def controller_cases(controller: RealtimeController, seed: int = 1) -> Controlle
 def _cap_factor(forces: FloatArray, cap_n: float, way: str) -> float:
     longest = float(np.linalg.norm(forces, axis=1).max())
     if not longest >= NO_FORCE * cap_n:
-        raise TrackingError(f"the {way} comes to no force: there is nothing to play")
+        raise TrackingError(
+            f"the {way} comes to no force: there is nothing to play; give a transient with content in the model's band"
+        )
     return OF_CAP * cap_n / longest

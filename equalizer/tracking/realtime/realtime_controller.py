@@ -25,34 +25,36 @@ from equalizer.tracking.lqr.tracking_problem import (
 )
 
 TAP_S, TAP_DECAY_S = 0.2, 0.04
-"""The transient where none is given: five time constants of a tap such as contacts leave behind."""
+"""Length and decay time of the default transient, a tap as contacts with a stiff surface cause: five time constants."""
 
 
 @dataclass(frozen=True, slots=True)
 class RealtimeSettings:
-    """Raises TrackingError for what no loop can run."""
+    """Settings of the two controllers. Raises TrackingError for values that no loop can run."""
 
     weight: float = 1e-3
-    """Of |force|² against |error|²."""
+    """Weight of |force|² against |error|², (m/s² per N)²."""
     preview_s: float = 0.2
-    """How long ahead a stream is known: by so much, less a tick, it is played late."""
+    """How long ahead a stream is known. It is played later by this time, less a tick."""
     cap_n: float = 3.0
-    """Of the force's length."""
+    """Limit of the force vector's length, N."""
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.preview_s) and self.preview_s >= 0):
-            raise TrackingError(f"the preview is {self.preview_s:g} s; it must not be negative")
+            raise TrackingError(f"the preview is {self.preview_s:g} s; give 0 or more")
         if not (np.isfinite(self.cap_n) and self.cap_n > 0):
-            raise TrackingError(f"the cap is {self.cap_n:g} N; it must be above zero")
+            raise TrackingError(f"the cap is {self.cap_n:g} N; give more than 0")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RealtimeController:
+    """Both controllers of a model, as plain arrays: `transient`, and `tracker` with `split` for streams."""
+
     tracker: PreviewTracker
     split: CausalSplit
     transient: TurningTransient
     loss: PreviewLoss
-    """Of the stream, by the model's own prediction, without that of the causal split."""
+    """Tracking loss of the stream by limited preview, predicted by the model; without the loss of the causal split."""
     cap_n: float
 
     @property
@@ -62,8 +64,8 @@ class RealtimeController:
     def simulate_stream(self, wanted: FloatArray) -> tuple[Bands, TrackResult]:
         """Simulate a stream of wanted (N, p) from rest: its bands, and the forces for the middle one.
 
-        Row k is of the tick at which row k of what is wanted arrives; played is then the row that came before it by
-        the preview less a sample. The cap is not kept here.
+        Row k belongs to the tick at which row k of `wanted` arrives; the row that is played then arrived earlier by
+        the preview less a sample. The cap is not applied here.
         """
         bands = self.split.split(wanted)
         late = len(self.tracker) - 1
@@ -74,7 +76,8 @@ class RealtimeController:
 def realtime_controller(
     model: IdentifiedModel, transient: FloatArray | None = None, settings: RealtimeSettings | None = None
 ) -> RealtimeController:
-    """transient: (N, p), m/s², before it is rotated; None = a tap along the last output. Room to come to rest is added.
+    """Make both controllers. transient: (N, p), m/s², before it is rotated; None = a tap along the last output. Samples
+    in which the device comes to rest are appended.
 
     Raises TrackingError for a model without stationary gains and for settings that no loop can run.
     """

@@ -20,12 +20,13 @@ BEYOND = 0.12
 RESONANT = 0.25
 """Largest damping ratio of what counts as a resonance; the rest is smooth."""
 LEAST_SHARE = 0.04
-"""Of the response, at the line of the band where the resonance is largest."""
+"""Least share of a resonance in the response, at the line of the band where the resonance is largest."""
 DRIFT = 0.1
 """A start that moves further in the fit, relative, was no resonance."""
 TERMS_PER_OCTAVE = 1.7
-"""Of the Chebyshev polynomials in log frequency that stand for the remainder."""
+"""Number of Chebyshev polynomials in log frequency, per octave, that describe the smooth remainder."""
 LINES_PER_OCTAVE = 100
+"""Lines per octave on which modes are fitted to a model's response."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,6 +11,7 @@ from equalizer.tracking.workspace.feedforward_at_place import used_models
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 LINES = 120
+"""Lines on which convergence is tested."""
 
 
 def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta: float = 1.0) -> Convergence | None:

@@ -21,6 +21,7 @@ from equalizer.tracking.workspace.workspace_models import Place, WorkspaceError,
 
 Interpolation = Literal["blended forces", "modal"]
 LINES = 300
+"""Lines on which interpolations are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +55,7 @@ class InterpolationChoice:
     checks: tuple[PlaceCheck, ...]
     workspace: WorkspaceModels
     modal: ModalInterpolation | None
-    """Of all models; None where it is not used."""
+    """Interpolation by the modes of all models; None where it is not used."""
 
     def at(self, place_m: Place) -> ModelsAtPlace:
         return self.modal.at(place_m) if self.modal else blend_at(self.workspace, place_m)
@@ -63,7 +64,7 @@ class InterpolationChoice:
 def held_out_model(model: IdentifiedModel, band_hz: tuple[float, float]) -> HeldOutPlace:
     """A model of a place, taken as the truth there. Raises ValueError without a place."""
     if model.place_m is None:
-        raise ValueError("the model that is held out does not say where it was identified")
+        raise ValueError("the model that is held out does not say where it was identified; identify it with its place")
     frequency_hz = np.geomspace(*band_hz, LINES)
     return HeldOutPlace(model.place_m, frequency_hz, model_response(model, frequency_hz))
 
@@ -71,11 +72,10 @@ def held_out_model(model: IdentifiedModel, band_hz: tuple[float, float]) -> Held
 def choose_interpolation(
     workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace] = (), weight: float = WEIGHT
 ) -> InterpolationChoice:
-    """With `held_out` by those; else each model that lies between the others is held out in turn, which judges a
-    coarser grid than the one that is used. Blended forces where nothing can be checked, or modes do not match.
-
-    Raises WorkspaceError for a held-out place where one of the models was identified: it would judge nothing.
-    """
+    """Choose between modal and blended interpolation: by the models of `held_out` places, else by holding out in turn
+    each model that lies between the others, which judges a coarser grid than the one that is used. Blended forces where
+    nothing can be checked, or modes do not match. Raises WorkspaceError for a held-out place where one of the models
+    was identified: it would judge nothing."""
     _check_apart(workspace, held_out)
     try:
         modal = modal_interpolation(workspace) if len(workspace) > 1 else None

@@ -21,7 +21,7 @@ from equalizer.tracking.workspace.place_weights import place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 REAL_POLES_PER_OCTAVE = 2.0
-"""Of the model of the remainder."""
+"""Density of the real poles that describe the smooth remainder."""
 POLES_FROM, POLES_TO = 0.3, 4.5
 """Lowest and highest of them, relative to the band's ends."""
 RANK_SHARE = 0.1

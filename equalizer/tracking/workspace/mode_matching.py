@@ -14,6 +14,7 @@ FREQUENCY_SCALE = 0.3
 ALONE = 0.6
 """Cost of a mode without a partner; a pair may cost twice as much at most."""
 LEAST_LIKENESS = 0.5
+"""Least likeness (MAC, 0 to 1) of the shapes of two modes that are matched."""
 LEAST_MARGIN = 0.1
 """Smallest difference in cost to the best matching without one of the pairs."""
 WEAK = 0.1
@@ -45,17 +46,23 @@ def match_modes(
             if index not in taken and mode.share >= WEAK and band_hz[0] <= mode.natural_hz <= band_hz[1]:
                 where = "second" if side == 0 else "first"
                 raise ModesDoNotMatchError(
-                    f"the resonance at {mode.natural_hz:.1f} Hz has no partner in the {where} model"
+                    f"the resonance at {mode.natural_hz:.1f} Hz has no partner in the {where} model; "
+                    "identify a place between"
                 )
     for i, j in pairs:
         likeness = mode_likeness(firsts[i].residue, seconds[j].residue)
         named = f"{firsts[i].natural_hz:.1f} Hz and {seconds[j].natural_hz:.1f} Hz"
         if likeness < LEAST_LIKENESS:
-            raise ModesDoNotMatchError(f"the resonances at {named} differ in shape (likeness {likeness:.2f})")
+            raise ModesDoNotMatchError(
+                f"the resonances at {named} differ in shape (likeness {likeness:.2f}); "
+                "identify places nearer to each other"
+            )
         forbidden = costs.copy()
         forbidden[i, j] = 10.0
         if _assign_modes(forbidden, len(firsts), len(seconds))[1] - total < LEAST_MARGIN:
-            raise ModesDoNotMatchError(f"it is in doubt whether the resonances at {named} are the same one")
+            raise ModesDoNotMatchError(
+                f"it is in doubt whether the resonances at {named} are the same one; identify a place between"
+            )
     return pairs
 
 

@@ -11,6 +11,7 @@ Place = tuple[float, float, float]
 """x, y, z in metres."""
 
 SAME_PLACE_M = 1e-4
+"""Distance below which two places are the same."""
 
 
 class WorkspaceError(ValueError):
@@ -66,7 +67,7 @@ def _check_alike(first: IdentifiedModel, model: IdentifiedModel, number: int) ->
         if each != other:
             raise WorkspaceError(f"model {number} has the {what} {other}, but the first has {each}")
     if model.spectral_radius >= 1:
-        raise WorkspaceError(f"model {number} is not stable, so nothing can be played through it")
+        raise WorkspaceError(f"model {number} is not stable, so nothing can be played through it; identify it again")
 
 
 def _check_places(models: tuple[IdentifiedModel, ...]) -> None:

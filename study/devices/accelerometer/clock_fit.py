@@ -1,4 +1,4 @@
-"""The microcontroller's clock by the host's: a sample arrives some time after it was taken, never before.
+"""Fit of the microcontroller's clock to the host's: a sample arrives some time after it was taken, never before.
 
 So the line from device time to host time lies below all arrivals, and of all such lines that one is taken which lies
 closest to them on average: an edge of the lower convex hull, no constant needed.

@@ -1,4 +1,5 @@
-"""The last minutes of samples, with when they arrived and what was lost until then. One thread adds, others take."""
+"""Ring of the last minutes of samples, with their time of arrival and the packets lost. One thread adds, others
+read."""
 
 import threading
 from dataclasses import dataclass
@@ -9,7 +10,8 @@ from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.samples import Counts, Samples
 
 KEPT_S = 300.0
-"""By the arrivals: the longest recording, and the minutes before it to which the clock is fitted."""
+"""Time for which samples are kept, by their arrival: the longest recording, and the minutes before it to which the
+clock is fitted."""
 
 
 class Table:
@@ -75,7 +77,7 @@ class History:
             self._forget(arrived_s - KEPT_S)
 
     def counted(self, since_s: float) -> Counts:
-        """From the last arrival before that time to the newest."""
+        """Counts from the last arrival before that time to the newest."""
         with self._lock:
             arrivals = self._arrivals.rows
             if not len(arrivals):

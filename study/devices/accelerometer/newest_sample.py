@@ -1,4 +1,4 @@
-"""The newest sample of a sensor, handed from the thread that reads it to a loop that waits for nothing.
+"""Newest sample of a sensor, handed without locks from the thread that reads it to a loop that must not wait.
 
 One writer, any number of readers, compiled ones too. A reader sees a whole sample, unless the writer laps it within a
 reading: then it reads once more. The lock is a barrier: its release makes a row visible before the count that names it.
@@ -14,9 +14,11 @@ FRESH_S = 0.05
 """A sample that is older is none: fifty ticks, and longer than a busy computer leaves a thread waiting."""
 
 COUNT, REST, ROWS = 0, 1, 16
-"""Of the first row: samples so far, and what counts as no acceleration (3). The others are samples."""
+"""Columns of the first row: number of samples so far, acceleration that counts as zero (3). The other rows are
+samples."""
 TAKEN_S, SENSED, CLIPPED, WIDTH = 0, 1, 4, 5
-"""Of a sample: when it came, by the monotonic clock, acceleration (3), m/s², and whether a channel was at its limit."""
+"""Columns of a sample: time of arrival by the monotonic clock, acceleration (3), m/s², whether a channel was at its
+limit."""
 
 
 class NewestSample:

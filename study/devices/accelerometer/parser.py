@@ -1,4 +1,5 @@
-"""From bytes as they come, torn, lost or garbled, to samples: every packet whose check sum is right, in order.
+"""Parses a byte stream, which may be torn, incomplete or garbled, to samples: every packet whose checksum is right, in
+order.
 
 A packet is looked for at every byte, so a garbled one hides none of its neighbours. A check sum is right by chance once
 in 65 536 times; so a packet counts when its number and time follow those of the one before, or, where the
@@ -71,7 +72,7 @@ MOST_DOUBTFUL = 8
 
 Indices = npt.NDArray[np.intp]
 Packets = npt.NDArray[np.void]
-"""Of `LAYOUT`."""
+"""Packets as an array of `LAYOUT`."""
 
 
 class PacketParser:
@@ -82,7 +83,7 @@ class PacketParser:
         self._doubtful: list[Packets] = []
         """Those after it that do not follow it, each (1,): the next packet tells."""
         self._sequence, self._time_us = 0, 0
-        """Of the newest packet, counted on."""
+        """Number and time of the newest packet, unwrapped."""
         self._received = 0
         self.counts = Counts()
 
@@ -104,8 +105,9 @@ class PacketParser:
         return self._count_on(last, packets, anew)
 
     def _choose(self, starts: Indices, packets: Packets) -> tuple[Packets, npt.NDArray[np.int64], int]:
-        """Those that count, (n,); (n,), 1 where the firmware began anew with it, else 0; how many bytes are used up.
-        Those of a doubtful packet are not: one that counts may begin among them."""
+        """Choose the packets that count. Returns them, (n,); (n,), 1 where the firmware began anew with the packet,
+        else 0; and how many bytes are used up. Bytes of a doubtful packet are not used up: a packet that counts may
+        begin among them."""
         chosen, anew, used, last = [packets[:0]], [0] * 0, 0, self._last
         for k, start in enumerate(starts.tolist()):
             packet = packets[k : k + 1]

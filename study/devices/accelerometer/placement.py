@@ -1,4 +1,4 @@
-"""Samples by the board's clock, placed on the ticks of the loop by the host's.
+"""Resamples the board's samples to the ticks of the loop, by the fitted clock.
 
 Each clock between two restarts of the board is fitted by itself (`clock_fit`). Then a low-pass without delay (a
 windowed sinc about each tick, over the samples as they lie in time) keeps what a rate of ticks can show and takes away
@@ -14,13 +14,14 @@ from study.devices.accelerometer.clock_fit import ClockFit, fit_clock
 from study.devices.accelerometer.history import Stretch
 
 CORNER = 0.42
-"""Of the lower of both rates, where the low-pass has -6 dB."""
+"""Frequency of the low-pass's -6 dB, relative to the lower of both rates."""
 
 HALF_PERIODS = 16
 """Half the length of the low-pass, in periods of the lower rate."""
 
 KAISER_BETA = 8.0
-"""Of its window. With the above: flat up to 0.33 of the lower rate, 80 dB down from half of it on."""
+"""Shape of the low-pass's Kaiser window. With `CORNER` and the filter's length: flat up to 0.33 of the lower rate, 80
+dB down from half of it on."""
 
 LONGEST_GAP = 2.5
 """Periods of the lower rate: samples further apart leave the ticks about them without a value."""
@@ -29,7 +30,8 @@ LEAST_FIT_S = 1.0
 """Shorter stretches of a clock are too short to be fitted: an arrival that is 0.1 ms late would be 100 ppm."""
 
 POINTS_PER_S = 50.0
-"""Of the arrivals that is the most that is fitted to, the promptest ones: lateness says nothing."""
+"""Most arrivals per second that the clock is fitted to: the least delayed ones, because a delay says nothing about the
+clock."""
 
 AT_ONCE = 4096
 """Ticks."""
@@ -40,7 +42,7 @@ class Placed:
     values: FloatArray
     """(k, channels) at the ticks; NaN where samples are missing."""
     fit: ClockFit | None
-    """Of the clock that most samples are of; None where none could be fitted."""
+    """Fit of the clock to which most samples belong; None where none could be fitted."""
 
 
 def place(stretch: Stretch, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> Placed:
@@ -97,7 +99,7 @@ def _whole(sample_s: FloatArray, tick_s: FloatArray, half_s: float, longest_s: f
 
 
 def _promptest(device_s: FloatArray, arrived_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Of the arrivals in each fiftieth of a second the one that was the least late."""
+    """Select the least delayed arrival of each fiftieth of a second."""
     bins = ((device_s - device_s[0]) * POINTS_PER_S).astype(np.int64)
     order = np.lexsort((arrived_s - device_s, bins))
     chosen = np.sort(order[np.unique(bins[order], return_index=True)[1]])

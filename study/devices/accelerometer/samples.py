@@ -1,4 +1,4 @@
-"""What comes from a board, before anything is made of it: numbered samples, the time by its clock, what was lost.
+"""Samples of a board before any processing: sequence numbers, times by the board's clock, counts of lost packets.
 
 A source is a serial line or a data-acquisition device; nothing behind it knows which.
 """
@@ -32,7 +32,7 @@ class Counts:
 
     packets: int = 0
     lost: int = 0
-    """By the gaps in the sequence numbers: those that arrived torn or garbled are among them."""
+    """Packets lost, counted by the gaps in the sequence numbers: torn or garbled arrivals are among them."""
     spoiled_bytes: int = 0
     """That belonged to no whole packet."""
     restarts: int = 0

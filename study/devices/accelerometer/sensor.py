@@ -1,5 +1,5 @@
-"""The accelerometer as the rig wants it: a thread reads the board, the newest sample is there at any time, and what
-belongs to the ticks of a recording can be asked for when it is over."""
+"""Accelerometer as a rig uses it: a thread reads the board; the newest sample is available at any time, and after a
+recording the samples at its ticks."""
 
 import contextlib
 import threading
@@ -26,7 +26,7 @@ FITTED_S = 120.0
 for a quartz that warms up."""
 
 LATENESS_S = 0.05
-"""So long after the last tick its samples are waited for."""
+"""Longest wait after the last tick for its samples."""
 
 
 class Accelerometer:
@@ -57,14 +57,14 @@ class Accelerometer:
 
     @property
     def samples(self) -> FloatArray:
-        """Where compiled code reads what `latest` tells."""
+        """The array from which compiled code reads what `latest` returns."""
         return self._newest.rows
 
     def latest(self) -> tuple[FloatArray, bool]:
         return self._newest.fresh(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed:
-        """As `study.devices.rig.SensesApart`."""
+        """Read the sensor apart from the position: the port of `study.devices.rig.SensesApart`."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
         placed = self._placed(tick_s, rate_hz) if len(tick_s) else Placed(np.zeros((0, 3)), None)
@@ -72,7 +72,8 @@ class Accelerometer:
         return Sensed(placed.values, _health(counts, placed.values, placed.fit))
 
     def rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
-        """Of the last seconds, at rest: what came, the standard deviation of each axis, m/s², samples per second."""
+        """What arrived in the last seconds at rest, the standard deviation of each axis (3,) in m/s², and samples per
+        second."""
         now_s = time.monotonic()
         stretch = self._history.stretch(now_s - seconds, now_s)
         noise = self._calibration.acceleration(stretch.raw).std(axis=0) if len(stretch.raw) else np.full(3, np.nan)

@@ -1,4 +1,5 @@
-"""What `hapteq doctor` says of an accelerometer at rest: rate, losses, clock, noise. None of it locks a device."""
+"""Findings of `hapteq doctor` about an accelerometer at rest: rate, losses, clock, noise. They are warnings: none of
+them prevents the use of a device."""
 
 import time
 
@@ -7,22 +8,22 @@ from study.session.facts.sensor_facts import SensorFacts
 from study.session.views.views import DeviceFinding
 
 LISTENED_S = 3.0
-"""A drift is known to some 50 ppm by then."""
+"""Time for which the sensor is read: a clock's drift is then known to about 50 ppm."""
 
 ENOUGH_PER_S = 1900.0
-"""2 kHz, less what a clock may be off: below, what the sensor's filter of 500 Hz lets through is aliased."""
+"""Least rate: 2 kHz less the tolerance of a clock. Below it, what passes the sensor's 500 Hz filter is aliased."""
 
 FEW_LOST = 0.001
-"""Of the packets: no cable needs to lose any."""
+"""Share of packets that may be lost: no cable needs to lose any."""
 
 PLAUSIBLE_PPM = 500.0
-"""A quartz is within 100 ppm, a ceramic resonator within 5000 and then wanders."""
+"""Largest plausible drift: a quartz is within 100 ppm, a ceramic resonator within 5000 and then wanders."""
 
 LATE_S = 0.05
-"""Beyond that the newest sample is none any more."""
+"""Longest delay of a packet: at a later arrival the newest sample says nothing about the present tick."""
 
 NOISY_MPS2 = 0.3
-"""Of one axis. An ADXL335 behind 500 Hz has 0.04 (x, y) and 0.08 (z)."""
+"""Largest rms noise of one axis. An ADXL335 behind 500 Hz has 0.04 (x, y) and 0.08 (z)."""
 
 
 def sensor_findings(sensor: Accelerometer) -> tuple[DeviceFinding, ...]:

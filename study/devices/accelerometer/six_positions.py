@@ -1,4 +1,4 @@
-"""The six-position calibration at a table: lay the sensor down, wait, turn it; then what the lab's file must say."""
+"""Six-position calibration at a table: lay the sensor down, wait, turn it; at the end, the text for the lab's file."""
 
 import time
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Where samples come from, by the name of the port: a board on a serial line, or a data-acquisition device.
+"""Sources of samples by the name of the port: a board on a serial line, or a data-acquisition device.
 
 `ni:Dev1` reads ai0 to ai2 of a device of National Instruments, `labjack:ANY` AIN0 to AIN2 of a LabJack T-series device
 (or of the one with that serial number), in volts. Their clock is the number of a sample over its rate.

@@ -1,4 +1,4 @@
-"""The loop that plays forces once a millisecond, and what it saw.
+"""Loop that plays forces once a millisecond, and its records.
 
 `realtime_drive` runs on the wall clock (its `Glances` are readings while nothing moves), `virtual_drive` on a simulated
 one; `runner` steps a compiled device through the governor, blocks of ticks at once, `stepped_runner` one that is driven

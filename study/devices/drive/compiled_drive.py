@@ -37,7 +37,7 @@ SPIN_S = 0.00015
 """Sleep until so long before a real tick, then wait awake: a sleep ends late by more than that on its own."""
 
 HAIR = 1e-6
-"""Of a tick: a sum of rounded times just short of one counts as that one."""
+"""Tolerance in ticks: a sum of rounded times just short of a tick counts as that tick."""
 
 SEEN_ROWS = 8
 """The newest readings; one that is copied meanwhile stays whole for so many ticks less one."""
@@ -138,7 +138,7 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
     def run_due(  # noqa: PLR0913 - compiled code takes function pointers one by one
         sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, course: Any, ticks: int
     ) -> int:
-        """At most `ticks` ticks, fewer if all is over before."""
+        """Run at most `ticks` ticks that are due, fewer if all is over before. Returns their number."""
         _ = sources
         code = GOES_ON
         for _k in range(ticks):

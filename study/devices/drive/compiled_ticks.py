@@ -1,4 +1,4 @@
-"""`compiled_drive` with its arguments: the rig's halves, the governor's arrays, and where the readings are seen."""
+"""Arguments of `compiled_drive`: the rig's compiled halves, the governor's arrays, and the array of last readings."""
 
 import numpy as np
 
@@ -56,7 +56,7 @@ class CompiledTicks:
         return self.last_seen() if self._running else None
 
     def last_seen(self) -> FloatArray | None:
-        """That of the last call, or of the one under way."""
+        """Last reading of the last call, or of the one under way."""
         while count := int(self._flags[SEEN]):
             reading: FloatArray = self._seen[(count - 1) % SEEN_ROWS].copy()
             if self._flags[SEEN] - count < SEEN_ROWS - 1:

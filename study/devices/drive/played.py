@@ -1,5 +1,5 @@
-"""From the rows of the compiled loop to what was played: a recording and its health. The samples of an accelerometer
-with a clock of its own come in here."""
+"""Converts the rows of the compiled loop to a recording and its health; samples of an accelerometer with its own clock
+are added here."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) fo
 
 
 def record_held_stimulus(governor: Governor, info: DeviceInfo, apart: SensesApart | None = None) -> Played:
-    """Of a held stimulus: the last of its steady part, whole loops unless the loop is longer than the ring."""
+    """Record of a held stimulus: the last of its steady part, whole loops unless the loop is longer than the ring."""
     rows, loop = governor.rows(), governor.steady
     whole = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
     kept = len(rows) // whole * whole
@@ -29,7 +29,7 @@ def record_held_stimulus(governor: Governor, info: DeviceInfo, apart: SensesApar
 
 
 def record_commands(governor: Governor, info: DeviceInfo, apart: SensesApart | None = None) -> Played:
-    """Of commands played once through; which segments they are, the caller knows."""
+    """Record of commands played once through; the caller knows which segments they are."""
     rows = governor.rows()
     if governor.fault is not Fault.NONE or len(rows) < len(governor.loop):
         return Played(recording=None, health=_with_acceleration(rows[:0], governor, info, apart)[1])

@@ -1,8 +1,11 @@
-"""The loop's thread before all others of the computer, and its memory kept from being swapped, where the system allows.
+"""Real-time scheduling of the loop's thread, and locking of its memory (no swapping), where the system allows them.
 
-What is not allowed is said, with the cure, and everything goes on without it. Below the priority of interrupt threads
-(50 on Linux): the device's own USB must go first. A loop that hangs starves nothing, as Linux comes: it leaves the
-ordinary threads 5 % of every second. Where that was switched off, the finding says so.
+Where the system refuses, the finding says so with the remedy, and the loop runs without them. The priority is below
+that of interrupt threads (50 on Linux), because the device's own USB transfers must come first. A loop that hangs
+cannot starve the computer under Linux's default, which reserves 5 % of every second for ordinary threads
+(`sched_rt_runtime_us`); where that is switched off, the finding says so.
+
+Reference: Linux manual pages sched(7), mlockall(2).
 """
 
 import contextlib
@@ -20,17 +23,18 @@ from study.session.views.views import DeviceFinding
 
 PRIORITY = 40
 SWITCH_S = 0.0005
-"""How long another thread of this program may keep the interpreter once the loop wants it; Python's own is 5 ms."""
+"""Longest time for which another Python thread keeps the interpreter once the loop wants it; Python's default is 5
+ms."""
 
 PRESENT_WHEN_TOUCHED = 1 | 4
-"""MCL_CURRENT | MCL_ONFAULT: what is mapped now, page by page as it is used; reserved room is not filled."""
+"""MCL_CURRENT | MCL_ONFAULT: lock what is mapped now, page by page as it is used; reserved memory is not filled."""
 
 FUTURE_TOO = 2
-"""MCL_FUTURE: what is mapped later as well. Under a limit, memory that is asked for beyond it would be refused then,
-and the program with it: only where there is no limit."""
+"""MCL_FUTURE: lock what is mapped later as well. Only where locked memory has no limit: allocations beyond a limit
+would fail and end the program."""
 
 RT_RUNTIME = Path("/proc/sys/kernel/sched_rt_runtime_us")
-"""What Linux lets real-time threads have of each second, in µs; -1: all."""
+"""Share of each second that Linux gives to real-time threads, in µs; -1: all of it."""
 
 STARVING_ADVICE = (
     "This computer lets such a loop take a whole core for itself (kernel.sched_rt_runtime_us is -1): while it hangs, "
@@ -48,6 +52,8 @@ LINUX_ADVICE = (
 
 @dataclass(frozen=True, slots=True)
 class Granted:
+    """What the system granted."""
+
     scheduled: bool
     locked: bool
     advice: str
@@ -55,8 +61,8 @@ class Granted:
 
 
 class _Users:
-    """Switch interval, memory lock and timer belong to the whole program: the first user changes them, the last to end
-    gives them back, in any order of their ends."""
+    """Counts the users of settings of the whole program (switch interval, memory lock, timer): the first user changes
+    them, the last to end restores them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -66,7 +72,7 @@ class _Users:
 
     def enter(self) -> Granted:
         with self._lock:
-            granted, undo = _request_class()  # each anew: the class is a thread's, and memory was mapped since
+            granted, undo = _request_class()  # by each user: the class is a thread's, and memory was mapped since
             if self._count == 0:
                 self._switch_s = sys.getswitchinterval()
                 sys.setswitchinterval(min(SWITCH_S, self._switch_s))
@@ -88,8 +94,8 @@ _USERS = _Users()
 
 @contextlib.contextmanager
 def real_time_class() -> Iterator[Granted]:
-    """For the calling thread until it ends, and for the program's memory until the last that asked for it ends. Raises
-    nothing."""
+    """Give the calling thread the real-time class until it ends, and lock the program's memory until the last user
+    ends. Raises nothing."""
     granted = _USERS.enter()
     try:
         yield granted
@@ -98,7 +104,7 @@ def real_time_class() -> Iterator[Granted]:
 
 
 def real_time_finding() -> DeviceFinding:
-    """What this account would be granted, tried in a thread of its own."""
+    """Finding on what the system grants to this account, tried in a separate thread."""
     found: list[Granted] = []
 
     def ask() -> None:
@@ -109,16 +115,16 @@ def real_time_finding() -> DeviceFinding:
     thread.start()
     thread.join()
     (granted,) = found
-    told = [
+    texts = [
         "the loop goes before all other programs" if granted.scheduled else "other programs may delay the loop",
         "its memory stays" if granted.locked else "its memory may be swapped",
     ]
     starving = granted.scheduled and _may_starve_others()
     if starving:
-        told.append("a loop that hangs may starve them")
+        texts.append("a loop that hangs may starve them")
     fine = granted.scheduled and granted.locked and not starving
     advice = " ".join(filter(None, (granted.advice, STARVING_ADVICE if starving else "")))
-    return DeviceFinding("Priority", "; ".join(told), fine, advice, warning=not fine)
+    return DeviceFinding("Priority", "; ".join(texts), fine, advice, warning=not fine)
 
 
 def _may_starve_others() -> bool:
@@ -129,7 +135,8 @@ def _may_starve_others() -> bool:
 
 
 def _request_class() -> tuple[Granted, Callable[[], None]]:
-    """And what takes back what the thread's end does not."""
+    """Request the class of the calling thread and the memory lock. Also returns the function that undoes what does not
+    end with the thread."""
     if platform.system() == "Linux":
         return _of_linux(ctypes.CDLL(None, use_errno=True))
     windows = getattr(ctypes, "windll", None)

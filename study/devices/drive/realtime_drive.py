@@ -1,5 +1,10 @@
 """Ticks in real time: a thread runs them as they become due.
 
+Theory of operation. Tick k is due at t_0 + k T (T = 1 ms). In each tick the loop senses (position, acceleration),
+governs (caps, slew limit, fades, workspace, faults) and writes one force, in this order: no force leaves that was not
+computed from this tick's reading. The due time is counted from the start, not from the last tick, so that delays do not
+add up. The loop sleeps until `SPIN_S` before the due time, then polls the clock, because a sleep alone ends late.
+
 A stimulus is a function of time. Ticks that come late are caught up where the world waits (a simulated rig); where
 it does not, they are counted as missed and the waveform goes on where the time is, never stretched.
 
@@ -75,7 +80,7 @@ class Glances:
         return self._request is not None and not self._request.taken.is_set()
 
     def mark_taken(self) -> None:
-        """To be said by the loop's thread after a reading."""
+        """Note that a reading was taken; called by the loop's thread after each."""
         if self._request is not None:
             self._request.taken.set()
 

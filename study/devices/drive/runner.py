@@ -1,4 +1,4 @@
-"""Running ticks: sense, govern, write. A force reaches a rig here, compiled, or in `stepped_runner`.
+"""Runs ticks: sense, govern, write. Compiled rigs get their forces here, others in `stepped_runner`.
 
 A simulated device runs whole blocks of ticks without Python. The three parts of a tick come as function pointers, not
 as inlined code: the loop is compiled once for every rig, its compiled form can be kept on disk, and it never holds an
@@ -58,12 +58,9 @@ _BLOCK = types.void(_SENSE, _TICK, _ADVANCE, _PUBLISH, _RIG, _GOVERNOR, types.in
 def run_block(  # noqa: PLR0913 - compiled code takes function pointers one by one
     sense: Any, govern: Any, advance: Any, publish: Any, rig: Any, governor: Any, ticks: int
 ) -> None:
-    """At most `ticks` ticks, fewer if all is over before.
-
-    rig = (state, parameters, noise) of the CompiledRig and room for a reading; governor = (state, settings, loop,
-    buffer, force) of `study.devices.governor.govern.tick`, and the telemetry ring; sense, govern, advance: `parts`;
-    publish: `PUBLISHED`.
-    """
+    """Run at most `ticks` ticks, fewer if all is over before. rig = (state, parameters, noise) of the CompiledRig and
+    room for a reading; governor = (state, settings, loop, buffer, force) of `study.devices.governor.govern.tick`, and
+    the telemetry ring; sense, govern, advance: `parts`; publish: `PUBLISHED`."""
     rig_state, parameters, noise, reading = rig
     state, settings, loop, buffer, force, ring = governor
     for _ in range(ticks):
@@ -86,7 +83,7 @@ class Runner(Protocol):
 
     @property
     def moving(self) -> bool:
-        """Until the governor is still and the rig has its last zero."""
+        """Whether the governor still moves the device, or the rig has not had its last zero."""
         ...
 
     @property
@@ -103,7 +100,7 @@ class Runner(Protocol):
         ...
 
     def run(self, ticks: int) -> None:
-        """At most so many ticks, fewer if all is over before. Never raises for a failing rig: see `failure`."""
+        """Run at most this many ticks, fewer if all is over before. Never raises for a failing rig: see `failure`."""
         ...
 
     def drop(self, fault: Fault) -> None:

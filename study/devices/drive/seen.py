@@ -1,4 +1,4 @@
-"""What was read from a rig last, and how the rest of the program hears of it."""
+"""Last reading of a rig, and its form for the rest of the program."""
 
 import math
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ class Seen:
     buttons: frozenset[int]
 
 
-def look_of(seen: Seen | None, missed_ticks: int) -> Look:
-    """Without anything seen: a look without a reading."""
-    if seen is None:
+def look_of(last: Seen | None, missed_ticks: int) -> Look:
+    """The look that screens may show; without a reading where nothing was read."""
+    if last is None:
         return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=missed_ticks)
     return Look(
-        position_m=_numbers(seen.reading[POSITION]),
-        acceleration_mps2=_numbers(seen.reading[ACCELERATION]),
-        sensor_clipped=bool(seen.reading[SENSOR_CLIPPED] == 1.0),
-        buttons=seen.buttons,
+        position_m=_numbers(last.reading[POSITION]),
+        acceleration_mps2=_numbers(last.reading[ACCELERATION]),
+        sensor_clipped=bool(last.reading[SENSOR_CLIPPED] == 1.0),
+        buttons=last.buttons,
         missed_ticks=missed_ticks,
     )
 

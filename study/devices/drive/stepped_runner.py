@@ -1,4 +1,4 @@
-"""Ticks of a rig that moves by itself, and what is done when its driver hangs or fails.
+"""Ticks of a real device, and what is done when its driver hangs or fails.
 
 Rigs with compiled halves are driven in compiled code (`compiled_drive`), others tick by tick from Python: one law.
 

@@ -1,4 +1,4 @@
-"""Ticks in virtual time: those that became due are run whenever the program sleeps."""
+"""Ticks in virtual time: whenever the program sleeps, the ticks that became due are run."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""The acceptance of a device: checked with no hand on it, signed by an operator, and gone when something changes.
+"""Acceptance of a device: checked with no hand on it, signed by an operator, and void when something changes.
 
 Without one, a device opens for no hand: neither for a person's nor for one that is simulated in a session.
 """
@@ -31,7 +31,7 @@ class Acceptance:
     gone_after_s: float
     """Until the device said that it was off."""
     asked_n: float = 0.0
-    """Of each layer, with a cap of `force_n`; 0 where that was not tried yet, as before November 2026."""
+    """Force asked of each layer, with a cap of `force_n`; 0 where that was not tested, as before November 2026."""
     most_given_n: float = 0.0
     """Then, as the device said."""
     baseline: str = ""

@@ -1,6 +1,5 @@
-"""From a name to a device that is open, calibrated, armed with its watchdog, and takes forces: or an error that says
-what is missing. Where a step fails, what was opened is stopped and closed again.
-"""
+"""Connects to a device by name: opened, calibrated, watchdog armed, forces on; otherwise an error that says what is
+missing. If a step fails, the device is stopped and closed again."""
 
 import os
 
@@ -126,7 +125,7 @@ def _none_of_them(
 
 def _others_instead(model: DeviceModel, others: list[tuple[str, str | None]]) -> DeviceError:
     known = [f"`--device {name}`" for _, name in others if name is not None]
-    found = ", ".join(name or f"{said!r}, which hapteq does not drive" for said, name in others)
+    found = ", ".join(name or f"{reported!r}, which hapteq does not drive" for reported, name in others)
     plug_in = f"plug the {model.name} in and switch its power on."
     do_now = f"Use {' or '.join(known)}, or {plug_in}" if known else plug_in[:1].upper() + plug_in[1:]
     return DeviceError(f"There is no {model.name}", f"Found instead: {found}.", do_now)

@@ -1,4 +1,4 @@
-"""What a check before a study day finds of a device: library, connection, power, calibration, watchdog. Zero force."""
+"""Findings about a device before a study day: library, connection, power, calibration, watchdog. Commands no force."""
 
 import contextlib
 import time
@@ -87,7 +87,8 @@ def _usb() -> list[DeviceFinding]:
 
 
 def _unplugged() -> list[DeviceFinding]:
-    """Where the library is missing, which would tell it; nothing where this system does not tell (no Linux)."""
+    """Finding on a device that is not plugged in, where the library that would say so is missing; empty where this
+    system cannot say it (no Linux)."""
     if find_usb_devices() is None:
         return []
     value, advice = "no device of the vendor is plugged in", "Plug its USB cable in and switch its power on."

@@ -1,5 +1,6 @@
-"""Part of the acceptance, with no hand on the handle: more than the cap is asked for, and the device must say that it
-gets no more than the cap; then a small force is held, the loop stops on purpose, and the force must be gone in time."""
+"""Proof of the force limit, a part of the acceptance with no hand on the handle: more than the cap is requested, and
+the device must report no more than the cap; then a small force is held, the loop stops on purpose, and the force must
+vanish in time."""
 
 import time
 from typing import Protocol

@@ -1,4 +1,4 @@
-"""Both halves of a tick of a device of the vendor, compiled: the reading, and the force.
+"""Both halves of a tick, compiled: reading and force.
 
 They are the law for every caller: the loop calls them without the interpreter, the rig's own methods call them from
 Python. An answer of 0 is fine; any other is one of the codes below, `FAILED` keeps the first, and no force follows it.
@@ -100,7 +100,8 @@ def _look(calls: Addresses, cells: FloatArray) -> int:
 
 @part
 def _sense_acceleration(samples: FloatArray, now: float, reading: FloatArray) -> None:
-    """As `study.devices.accelerometer.newest_sample.NewestSample.fresh`."""
+    """Read the accelerometer in compiled code, as `study.devices.accelerometer.newest_sample.NewestSample.fresh` does
+    in Python."""
     count = samples[0, COUNT]
     while count > 0.0:
         row = 1 + int(count - 1.0) % ROWS
@@ -142,7 +143,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
 
 @part
 def _is_silent(calls: Addresses, cells: FloatArray) -> bool:
-    """For longer than the device holds a force by itself."""
+    """Whether no force was sent for longer than the device holds a force by itself."""
     return bool(now_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
 
 
@@ -168,7 +169,7 @@ def _wake(calls: Addresses, cells: FloatArray) -> int:
 
 @part
 def _send(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
-    """Only with the lock."""
+    """Send a force. The caller must hold the lock."""
     if _is_silent(calls, cells):
         code = _wake(calls, cells)
         if code != 0:

@@ -1,4 +1,4 @@
-"""One opened device: the library's functions with its number filled in, in values instead of pointers."""
+"""An opened device: the library's functions bound to its number, with values instead of pointers."""
 
 import contextlib
 from ctypes import byref, c_double, c_int, c_ubyte, c_ushort
@@ -15,7 +15,7 @@ STATUS_SIZE = 32
 """17 in SDK 3.17.5; room for more, since a library writes as many as it knows."""
 
 FORCE_ON_PLACE, OFF_CAUSE_PLACE = 5, 14
-"""Of a status."""
+"""Indices in the library's status array."""
 OFF_CAUSES = {
     1: "a button of the device was pressed",
     2: "the handle moved faster than the device allows",
@@ -125,7 +125,8 @@ class Handle:
         self.library.call("dhdSetTimeGuard", 0, self.number)
 
     def arm_watchdog(self, seconds: float) -> float:
-        """For how long the device holds a force now that no other follows, s, as it says itself; 0: for ever."""
+        """Arm the watchdog. Returns for how long the device now holds a force that no other follows, in s, as the
+        device reports it; 0: for ever."""
         self.library.call("dhdEnableExpertMode")
         units = c_ubyte()
         try:

@@ -1,4 +1,4 @@
-"""What a lab knows of its device beyond the vendor's library: a small TOML file, of which every key may be left out."""
+"""A lab's settings of its device, such as its accelerometer: a small TOML file, in which every key is optional."""
 
 import os
 import re
@@ -19,7 +19,7 @@ from study.errors import DeviceError
 Triple = tuple[float, float, float]
 
 HEADER = re.compile(r"\s*\[\[?[\w.\"-]+\]\]?\s*(#.*)?")
-"""Of a table in TOML; a row of numbers is none."""
+"""Header of a table in TOML; a row of numbers in brackets does not match."""
 
 FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
 

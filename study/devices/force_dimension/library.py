@@ -1,4 +1,4 @@
-"""The vendor's functions, bound by ctypes: every answer below zero becomes an error with the library's own words.
+"""Bindings of the vendor's functions by ctypes: a negative return value becomes an error with the library's own text.
 
 The library keeps its last error per thread, so the text is fetched at once, in the thread whose call failed.
 """
@@ -19,7 +19,7 @@ OLDEST_SDK = (3, 16, 0)
 """From here on all functions are there with the types below; older ones differ in some."""
 
 GEOMETRY_ERROR, DEVICE_IN_USE = 8, 20
-"""Of the library's error codes, those that something is decided by."""
+"""Error codes of the library on which a decision depends."""
 
 _ID, _NUMBER, _NUMBERS = c_byte, c_double, POINTER(c_double)
 _THREE = (_NUMBERS, _NUMBERS, _NUMBERS, _ID)
@@ -106,13 +106,13 @@ class Library:
         raise self.last_error(name)
 
     def last_error(self, name: str) -> LibraryError:
-        """Of this function, whose call just failed in this thread."""
+        """The error of this function, whose call just failed in this thread."""
         code = int(self._functions["dhdErrorGetLast"]())
         text = self._functions["dhdErrorGetLastStr"]() or b"no reason given"
         return LibraryError(name, code, text.decode("utf-8", "replace"))
 
     def addresses(self, names: tuple[str, ...]) -> npt.NDArray[np.int64]:
-        """For calls from compiled code."""
+        """Addresses of the library's functions, for calls from compiled code."""
         return np.array([address_of(self._functions[name]) for name in names], dtype=np.int64)
 
     def call(self, name: str, *arguments: Any) -> int:

@@ -1,4 +1,4 @@
-"""What the vendor's library knows of an open device's linkage, at any position: computed, so nothing moves.
+"""Linkage of an open device at any position, as the vendor's library computes it: nothing moves.
 
 A position becomes encoder counts, joint angles, Jacobian, inertia and gravity torques, each by a function of the
 library. The device gets no force and stays braked; where its handle is does not matter, beyond one comparison.
@@ -42,11 +42,11 @@ class VendorLinkage:
         self._library, self._number = handle.library, handle.number
 
     def at(self, position_m: FloatArray) -> LinkageReading | None:
-        """None out of reach. Raises `DeviceError`."""
+        """The linkage at a position of the handle; None out of reach. Raises `DeviceError`."""
         return self._asked(self._at, position_m)
 
     def angles_at(self, position_m: FloatArray) -> FloatArray | None:
-        """As `at`, the joint angles alone."""
+        """Joint angles (3,) at a position of the handle, rad; None out of reach. Raises `DeviceError`."""
         return self._asked(lambda place: self._angles(self._counts(place)), position_m)
 
     def check_frame(self) -> None:
@@ -56,9 +56,9 @@ class VendorLinkage:
         except LibraryError as error:
             raise device_error(self._model.name, error) from error
         reading = self.at(here)
-        told = (c_double * JOINTS)()
-        self._library.call("dhdGetJointAngles", told, self._number)
-        if reading is not None and self._moves_by(reading, np.array(told[:3])) <= SAME_M:
+        reported = (c_double * JOINTS)()
+        self._library.call("dhdGetJointAngles", reported, self._number)
+        if reading is not None and self._moves_by(reading, np.array(reported[:3])) <= SAME_M:
             return
         raise DeviceError(
             f"The linkage of the {self._model.name} was not read",
@@ -74,7 +74,7 @@ class VendorLinkage:
         return float(np.linalg.norm(jacobian @ (angles - reading.joint_angle_rad)))
 
     def _asked(self, ask: Callable[[FloatArray], Told | None], position_m: FloatArray) -> Told | None:
-        """None out of reach. Raises `DeviceError`."""
+        """Ask the library for the linkage at a position; None out of reach. Raises `DeviceError`."""
         try:
             return ask(position_m)
         except LibraryError as error:

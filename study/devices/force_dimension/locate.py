@@ -1,4 +1,4 @@
-"""Where the vendor's library lies on this computer. It is looked for where its installer and its own tools put it."""
+"""Locates the vendor's library on this computer, where its installer and its own tools put it."""
 
 import platform
 import sys

@@ -1,4 +1,4 @@
-"""The vendor's devices that can be opened, in translation. Light: the command line reads it for its names."""
+"""Names of the vendor's devices that can be opened. Light to import: the command line needs the names."""
 
 from dataclasses import dataclass
 

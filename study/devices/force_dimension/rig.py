@@ -1,4 +1,4 @@
-"""A device of the vendor as a rig: readings, forces, and all that makes it let go.
+"""A device of the vendor as a rig: readings, forces, and everything that releases its force.
 
 Beyond what the safety layer does, a force above the cap or no number is never sent (`halves`), and the library is told
 the cap as well. Anything odd ends in an error: the safety layer then writes zero, and the watchdog sees to the rest.
@@ -34,7 +34,7 @@ class Accelerometer(Protocol):
         ...
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
-        """As `study.devices.rig.SensesApart`."""
+        """Sensor reading apart from the position: the port of `study.devices.rig.SensesApart`."""
         ...
 
     def close(self) -> None:
@@ -76,7 +76,7 @@ class ForceDimensionRig:
 
     @property
     def halves(self) -> Halves | None:
-        """None with an accelerometer that compiled code cannot read."""
+        """The two halves of a compiled tick; None with an accelerometer that compiled code cannot read."""
         if self._overlaid is not None:
             return None
         return Halves(halves.sense_once, halves.write_once, self._calls, self._cells, self._samples, self._error)
@@ -123,8 +123,8 @@ class ForceDimensionRig:
         return math.hypot(x, y)
 
     def given_past_this_n(self, asked_n: float) -> float:
-        """For the acceptance, with no hand on the handle: of so much along x, told to the library past the cap of this
-        file, what the device gives before the zero that follows at once. Raises `DeviceError`."""
+        """For the acceptance, with no hand on the handle: ask the library for this force along x, past the cap of this
+        file, and return the force that the device gives before the zero that follows at once. Raises `DeviceError`."""
         with self._sending:
             try:
                 self._handle.set_force(asked_n, 0.0, 0.0)
@@ -149,7 +149,7 @@ class ForceDimensionRig:
                 self._accelerometer.close()
 
     def _rest(self) -> None:
-        """Only ever repeats a zero: never sends one between two forces, nor anything after a failure."""
+        """Repeat a zero force. Never sends one between two forces, nor anything after a failure."""
         every_s, zero, cells = REST_SHARE * self.drops_force_after_s, np.zeros(3), self._cells
         while not self._closed.wait(every_s) and cells[halves.FAILED] == 0.0:
             with self._sending:
@@ -165,7 +165,8 @@ class ForceDimensionRig:
             raise self._error(code)
 
     def _error(self, code: int) -> DeviceError:
-        """In the thread that got the code: the library keeps its last error per thread."""
+        """The error of a code; called in the thread that got the code, because the library keeps its last error per
+        thread."""
         return self._failure or self._fail(self._words(int(self._cells[halves.FAILED]) or code))
 
     def _words(self, code: int) -> str:

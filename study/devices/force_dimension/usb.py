@@ -1,4 +1,4 @@
-"""Which of the vendor's devices are plugged in, and whether this account may open them: asked of Linux itself.
+"""Devices of the vendor on the USB, and whether this account may open them, as Linux reports it.
 
 A device that may not be opened looks to the vendor's library as if it were not there.
 """
@@ -29,7 +29,7 @@ class UsbDevice:
 def find_usb_devices(
     devices: Path = Path("/sys/bus/usb/devices"), nodes: Path = Path("/dev/bus/usb")
 ) -> tuple[UsbDevice, ...] | None:
-    """None where this system does not tell (no Linux)."""
+    """Find devices on the USB; None where this system cannot list them (no Linux)."""
     if not devices.is_dir():
         return None
     found = []

@@ -1,4 +1,5 @@
-"""Proof that the device lets go by itself: it is armed, the loop stops on purpose, and the force must be gone in time.
+"""Proof that the device's watchdog works: it is armed, the loop stops on purpose, and the device must switch its force
+off in time.
 
 The command is zero throughout, so nothing pulls whether or not it works; what counts is that the device says that it
 takes no forces any more, that its brakes hold, and that its watchdog is why.
@@ -12,7 +13,7 @@ from study.errors import DeviceError
 ARMED_FOR_S = 0.05
 EVERY_S = 0.002
 MARGIN_S = 0.02
-"""Beyond the watchdog's time: for the USB and the device's own bookkeeping."""
+"""Time granted beyond the watchdog's own, for the USB and the device's own bookkeeping."""
 
 ATTEMPTS = 5
 """A busy computer may come too late for the watchdog before it is meant to."""

@@ -16,7 +16,8 @@ never an exception halfway through a tick. Inlined, a tick takes half the time t
 
 
 def fingerprint(folder: Path, *beyond: Path) -> int:
-    """Of all Python sources in it, and of files beyond it whose numbers are compiled in; 32 bits."""
+    """Checksum (32 bits) of all Python sources in the folder, and of files outside it whose constants are compiled
+    in."""
     digest = hashlib.sha256()
     for source in (*sorted(folder.glob("*.py")), *beyond):
         digest.update(source.read_bytes())

@@ -89,7 +89,7 @@ def _hear(state: FloatArray, settings: FloatArray) -> None:
 
 @part
 def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
-    """From 0 at 0 ticks to 1 at `length`."""
+    """Share of a fade: from 0 at 0 ticks to 1 at `length`."""
     if ticks >= length:
         return 1.0
     if ticks <= 0:
@@ -196,7 +196,7 @@ def _publishing(sources: int) -> Any:
 def _entry_points(sources: int) -> tuple[Any, Any]:
     @njit(MISS_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def miss(state: FloatArray, buffer: FloatArray, nothing: FloatArray, ticks: int) -> None:
-        """So many ticks went by unattended: their rows hold the last force, and `nothing` as their reading."""
+        """Record ticks that passed unattended: their rows hold the last force, and `nothing` as their reading."""
         _ = sources
         for _k in range(ticks):
             _record(state, buffer, nothing)

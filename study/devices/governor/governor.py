@@ -122,11 +122,11 @@ class Governor:
         self.state[cells.FORCE : cells.FORCE + 3] = 0.0
 
     def miss(self, ticks: int) -> None:
-        """So many ticks went by unattended: the device held its last force, and its sensors were not read."""
+        """Record ticks that passed unattended: the device held its last force, and its sensors were not read."""
         govern.miss(self.state, self.buffer, self.nothing, ticks)
 
     def count_lateness(self, late: bool, after_s: float) -> None:
-        """Of the tick that was just run: whether it ended late, and how long after it was due."""
+        """Record whether the tick that was just run ended late, and how long after it was due."""
         self.state[cells.LATE] += late
         self.state[cells.LATEST_S] = max(self.state[cells.LATEST_S], after_s)
 

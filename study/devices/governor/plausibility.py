@@ -43,7 +43,7 @@ from study.devices.governor.compiling import part
 from study.devices.governor.confine import below, norm_of
 
 IMPLAUSIBLE_M = 0.5
-"""Beyond it a reading counts as no number at all."""
+"""A reading beyond this counts as no number at all."""
 
 GRIPPED_KG, GRIPPED_N_S_PER_M, GRIPPED_N_PER_M = 1.0, 60.0, 3000.0
 """A handle in a hard grip moves no less than this. A whole arm has 0.55 kg, 6.5 N s/m, 135 N/m (Sci. Rep. srep18004),
@@ -56,8 +56,9 @@ to have moved, before a reading that did not change is stale."""
 
 @part
 def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
-    """Of the gripped handle in the last tick, by the stimulus: what a hand at rest holds, it has held before. Dry
-    friction lets only that part through by which it goes beyond the last one that moved the handle (Prandtl's play)."""
+    """Update the motion expected of the gripped handle in the last tick, by the stimulus: a hand at rest has held
+    before what it holds now. Dry friction passes only the part of a force that exceeds the last one that moved the
+    handle (Prandtl's play operator)."""
     x = state[EXCITATION] - state[MOVING_FORCE]
     y = state[EXCITATION + 1] - state[MOVING_FORCE + 1]
     z = state[EXCITATION + 2] - state[MOVING_FORCE + 2]

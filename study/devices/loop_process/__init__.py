@@ -1,4 +1,4 @@
-"""A real device's loop in a process of its own, the only one that holds the device.
+"""Separate process for a real device's loop; only this process opens the device.
 
 `start` begins the process, `serve` is what runs in it: the safety layer as ever, with a thread for each of the `LINES`.
 `line` is this side of a pipe, `remote_device` the device port over all of them. Begin at `remote_device.py`.

@@ -1,5 +1,5 @@
-"""This side of a pipe to the loop's process. A thread writes and reads, so that a caller who is interrupted leaves no
-half message behind, and waits no longer than it is willing to for a process that hangs."""
+"""Caller's end of a pipe to the loop's process. A thread writes and reads, so that an interrupted caller leaves no half
+message, and waits no longer than its timeout for a process that hangs."""
 
 import contextlib
 import pickle
@@ -30,7 +30,7 @@ GRACE_S = 0.5
 """When this process stood still, the other looks late too: it gets so long to answer."""
 
 CLOSE_S = 6.0
-"""Beyond the fade: a driver that hangs is left to itself after less."""
+"""Time granted beyond the fade to end in order; a driver that hangs is abandoned sooner."""
 
 
 class LoopGoneError(Exception):

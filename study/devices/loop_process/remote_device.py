@@ -1,4 +1,4 @@
-"""The device port over a device in the loop's process. No call waits without a bound.
+"""Device port over a device in the loop's process. Every call has a timeout.
 
 A process that ended, or that does not answer, is a lost device: it is killed where it still runs, so that no force
 comes back, and the device's own watchdog has dropped what it held.
@@ -24,8 +24,9 @@ OPENING_S = 180.0
 """Timeout for importing, for compiling where necessary, and for opening the device."""
 
 ANSWER_S = 3.0
-"""Beyond what a busy computer is late by, and beyond the safety layer's own waits: its loop is given up after 0.1 s, a
-zero force is written within 0.1 s, and a device that does not become still is lost 1 s after its fades."""
+"""Longest wait for an answer, above what a busy computer is late by and above the safety layer's own waits: its loop is
+given up after 0.1 s, a zero force is written within 0.1 s, and a device that does not become still is lost 1 s after
+its fades."""
 
 STOP_S = 0.5
 """An emergency stop waits no longer, without a grace: the process is killed."""

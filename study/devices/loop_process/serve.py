@@ -1,4 +1,4 @@
-"""What runs in the loop's process: a device behind its safety layer, and a thread for each line of its caller.
+"""Main program of the loop's process: a device behind its safety layer, and a thread for each pipe of its caller.
 
 A sign of life is always the caller's: `keep_alive` runs when it is called from there, and `play` goes on only as long
 as the caller answers its progress. When the caller's end of a pipe closes, for any reason, the force fades, the brakes
@@ -32,7 +32,8 @@ OPENING_GRACE_S = 1.0
 """While the device is opened, no force of a stimulus is on that a fade would end: the process ends soon."""
 
 OVERDUE_S = CLOSE_S + 3.0
-"""Beyond the fade: only a process that hangs, in the driver or in an exit handler, takes so long to end."""
+"""Time granted beyond the fade: only a process that hangs, in the driver or in an exit handler, takes so long to
+end."""
 
 
 class BrokenOffError(Exception):
@@ -76,7 +77,7 @@ class DeviceServer:
             thread.start()
 
     def close(self) -> None:
-        """With a fade; then the caller hears that it is done. Never raises."""
+        """Close the device with a fade, then tell the caller that it is done. Never raises."""
         self._device.close()
         self._closed.set()
         self._threads[-1].join(LAST_ANSWER_S)

@@ -1,4 +1,4 @@
-"""The loop's process and the pipes to it.
+"""Starts the loop's process and opens the pipes to it.
 
 Not `multiprocessing`: that would run the caller's main module again in there, and hand the terminal on. Not a fork: the
 caller has threads.

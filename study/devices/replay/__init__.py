@@ -1,1 +1,1 @@
-"""A device that answers with what was once recorded: for demonstrations, and for tests of everything above a device."""
+"""A device that replays a recording: for demonstrations, and for tests of everything above a device."""

@@ -1,4 +1,4 @@
-"""A recording as a rig: for any force that is asked for, the handle moves as it once did.
+"""A recording as a rig: whatever force is commanded, the handle moves as recorded.
 
 Before each stimulus the stretch is looked for whose recorded excitation is nearest to what shall be played (least
 squares over the whole stretch). Commands that were recorded so are answered exactly as they were then; others by the
@@ -30,8 +30,8 @@ OVER_S = 0.02
 NOMINAL = MODELS["omega3"]
 
 TICK, FIRST, LENGTH, REPEATS, OVER = range(5)
-"""Of the state: ticks since the first row (negative before), first row of the stretch, its rows, whether it is
-repeated, and rows over which its end goes over into its beginning."""
+"""Indices in the state: ticks since the first row (negative before), first row of the stretch, its number of rows,
+whether it is repeated, and rows over which its end is cross-faded into its beginning."""
 
 AX, TRUE_AX = ACCELERATION.start, TRUE_ACCELERATION.start
 
@@ -110,7 +110,7 @@ def replay_rig(path: Path) -> CompiledRig:
 
 
 def _nearest(excitation: FloatArray, wanted: FloatArray) -> int:
-    """Where in the excitation (N, 3) the stretch begins that differs least from wanted (n, 3), n <= N."""
+    """Index in the excitation (N, 3) of the stretch that differs least from wanted (n, 3), n <= N."""
     rows = len(excitation) - len(wanted) + 1
     size = len(excitation) + len(wanted)
     lines = np.fft.rfft(excitation, size, axis=0) * np.fft.rfft(wanted, size, axis=0).conj()

@@ -41,7 +41,7 @@ def build_omega3(
     free, held = pack_parameters(parameters, False, place_m), packed.copy()
 
     def simulate_hand(on_handle: bool) -> None:
-        """Only what the hand adds changes, not what a test has planted elsewhere."""
+        """Change what the hand adds, and nothing that a test has planted elsewhere."""
         changed = free != held
         packed[changed] = (held if on_handle and hand else free)[changed]
 

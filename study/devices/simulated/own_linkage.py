@@ -21,13 +21,14 @@ from study.devices.simulated.packing import effective_mass_kg, isotropic_depth_m
 from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Masses, Omega3Parameters
 
 MOST_MISFIT = 0.1
-"""Of Jacobian or inertia, relative: beyond it the simulated device would not be that of the calibration."""
+"""Largest relative misfit of Jacobian or inertia: above it the simulated device would not be that of the
+calibration."""
 LIGHTEST_KG = 0.07
-"""Of what moves with the handle: what swings on it weighs 54 g."""
+"""Least mass that moves with the handle: the parts that swing on it weigh 54 g."""
 
 
 class SimulatedLinkage:
-    """Without a hand."""
+    """Linkage of the simulated omega.3, without a hand."""
 
     def __init__(self, parameters: Omega3Parameters, info: DeviceInfo) -> None:
         self.info = info
@@ -35,7 +36,7 @@ class SimulatedLinkage:
         self._masses, self._reach_m = parameters.masses, parameters.stops.radius_m
 
     def at(self, position_m: FloatArray) -> LinkageReading | None:
-        """None in the stops."""
+        """The linkage at a position of the handle; None in the stops."""
         if not float(np.linalg.norm(position_m)) < self._reach_m:
             return None
         angles, rates = _pose(self._packed, position_m)
@@ -47,11 +48,11 @@ class SimulatedLinkage:
         return LinkageReading(np.array(position_m), angles, jacobian, inertia, held)
 
     def angles_at(self, position_m: FloatArray) -> FloatArray | None:
-        """As `at`, the joint angles alone."""
+        """Joint angles (3,) at a position of the handle, rad; None in the stops."""
         return _pose(self._packed, position_m)[0] if float(np.linalg.norm(position_m)) < self._reach_m else None
 
     def check_frame(self) -> None:
-        """It has one frame."""
+        """Nothing to check: a simulated linkage has a single frame."""
 
 
 @dataclass(frozen=True, slots=True)

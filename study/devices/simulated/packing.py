@@ -46,7 +46,7 @@ def state_at_rest(packed: FloatArray, place_m: Vector) -> FloatArray:
 
 
 def effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) -> float:
-    """At the centre, where it is the same in all directions; without hand."""
+    """Effective mass at the centre, where it is the same in all directions; without a hand."""
     jacobian = np.empty((3, 3))
     pose(packed, np.zeros(3), np.empty(3), jacobian)
     masses = parameters.masses

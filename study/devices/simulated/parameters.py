@@ -25,7 +25,7 @@ class Linkage:
     azimuths_deg: Vector = (90.0, 210.0, 330.0)
     """From y towards z. First leg upright, as the omega.3 stands: the x-z plane is a mirror plane."""
     depth_m: float | None = None
-    """Of the origin in front of the base's plane; None: at the isotropic point."""
+    """Distance of the origin in front of the base's plane; None: the isotropic point is the origin."""
 
 
 @dataclass(frozen=True, slots=True)

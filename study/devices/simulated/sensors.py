@@ -34,7 +34,7 @@ _ULP = 2.0**-53
 
 @inlined
 def uniform(noise: npt.NDArray[np.uint64]) -> Any:
-    """In (0, 1]. Moves noise[0] on."""
+    """Draw a uniform number in (0, 1]. Advances noise[0]."""
     noise[0] += _STEP
     word = noise[0]
     word = (word ^ (word >> _S30)) * _MIX_1

@@ -35,7 +35,7 @@ def main(arguments: list[str]) -> None:
     """Read case names from standard input until it ends; answer each and print its name."""
     cases = Path(arguments[0]).resolve()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all; the parent ends us
-    stay_apart(cases)
+    isolate_process(cases)
     digest = engine_digest()
     for line in sys.stdin:
         answer(cases / line.strip(), digest)
@@ -43,7 +43,7 @@ def main(arguments: list[str]) -> None:
         sys.stdout.flush()
 
 
-def stay_apart(cases: Path) -> None:
+def isolate_process(cases: Path) -> None:
     """Install an audit hook: from here on this process cannot import the challenge, open or list any path beside
     `cases`, or start a program."""
     sys.modules[APART] = cast(ModuleType, None)
@@ -76,10 +76,10 @@ def answer(place: Path, digest: str) -> None:
     answer."""
     began, worked = time.perf_counter(), time.process_time()
     try:
-        said = _diagnose_case(place)
+        document = _diagnose_case(place)
     except Exception:  # noqa: BLE001 - the bank goes on, and the score counts it
-        said = {"failed": traceback.format_exc()}
-    said |= {
+        document = {"failed": traceback.format_exc()}
+    document |= {
         "name": place.name,
         "seconds": time.perf_counter() - began,
         "cpu_seconds": time.process_time() - worked,
@@ -89,7 +89,7 @@ def answer(place: Path, digest: str) -> None:
         "engine": digest,
         "knows_the_challenge": challenge_is_loaded(),
     }
-    write_text(place / ANSWER, json.dumps(said, indent=1) + "\n", overwrite=True)
+    write_text(place / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
 def challenge_is_loaded() -> bool:
@@ -133,15 +133,15 @@ def _diagnose_case(place: Path) -> dict[str, Any]:
     )
     found = diagnose(recordings, read_mechanical_model(place / MODEL), settings, map, lambda what, share: None)
     errors = {stage: dict(channels) for stage, channels in found.channel_errors.items()}
-    said = {
+    answer = {
         "diagnosis": diagnosis_to_json(found.diagnosis),
         "channel_errors": errors,
         "remarks": list(found.remarks),
     }
     if (proposal := found.proposal) is not None:
         best = [experiment.words for experiment in proposal.chosen.experiments]
-        said["proposal"] = {"axis": proposal.axis, "level": proposal.level, "best": best}
-    return said
+        answer["proposal"] = {"axis": proposal.axis, "level": proposal.level, "best": best}
+    return answer
 
 
 if __name__ == "__main__":

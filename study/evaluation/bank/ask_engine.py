@@ -115,11 +115,11 @@ def _send_cases(
     folder: ProofFolder, wanted: Sequence[str], executor: Executor, on_answered: Callable[[str], None]
 ) -> None:
     cases = ((name, (name, read_files(folder.open / name))) for name in wanted)
-    for name, said in finished_pieces(executor, answer_sent_case, cases):
-        if said is None:
+    for name, document in finished_pieces(executor, answer_sent_case, cases):
+        if document is None:
             _write_failure(folder.open / name)
         else:
-            write_text(folder.open / name / ANSWER, said, overwrite=True)
+            write_text(folder.open / name / ANSWER, document, overwrite=True)
         on_answered(name)
 
 
@@ -188,8 +188,8 @@ def is_answered(place: Path) -> bool:
 
 def _write_failure(place: Path) -> None:
     how = f"the process died {TRIES} times, or took longer than {PATIENCE_S:g} s"
-    said = {"name": place.name, "failed": how, DIED: True}
-    write_text(place / ANSWER, json.dumps(said, indent=1) + "\n", overwrite=True)
+    document = {"name": place.name, "failed": how, DIED: True}
+    write_text(place / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
 def forget_recording(place: Path) -> None:

@@ -116,7 +116,7 @@ def _write_case(
 
 
 def _found(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
-    def said(which: str) -> tuple[str, tuple[str, ...]]:
+    def read_follow_up(which: str) -> tuple[str, tuple[str, ...]]:
         if which not in label:
             return "", ()
         answer = read_answer(again.open / label[which]["name"])
@@ -125,6 +125,6 @@ def _found(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowU
         returned = () if "failed" in answer else diagnosis_from_json(answer["diagnosis"]).returned_set
         return label[which]["words"], returned
 
-    proposed, after_proposed = said(PROPOSED)
-    drawn, after_drawn = said(DRAWN)
+    proposed, after_proposed = read_follow_up(PROPOSED)
+    drawn, after_drawn = read_follow_up(DRAWN)
     return FollowUp(start.number, start.names[0], start.returned, proposed, after_proposed, drawn, after_drawn)

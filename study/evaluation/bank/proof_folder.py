@@ -50,11 +50,11 @@ def open_proof_folder(path: Path, seed: int, brief: bool, of: str = "") -> Proof
 
     Raises StudyError where the folder holds something else or a bank with other settings.
     """
-    folder, said = ProofFolder(path), path / "bank.json"
+    folder, plan_path = ProofFolder(path), path / "bank.json"
     bank = {"format": "hapteq-bank", "version": 1, "seed": seed, "brief": brief, **({"of": of} if of else {})}
     wanted = json.dumps(bank, indent=1) + "\n"
-    if said.exists():
-        if parse_json(said, read_text(said), "bank") != json.loads(wanted):
+    if plan_path.exists():
+        if parse_json(plan_path, read_text(plan_path), "bank") != json.loads(wanted):
             raise StudyError(
                 "This folder holds another bank",
                 f"{path} was begun with another --seed, other options, or another length of its recordings.",
@@ -71,5 +71,5 @@ def open_proof_folder(path: Path, seed: int, brief: bool, of: str = "") -> Proof
         )
     for each in (folder.open, folder.sealed):
         each.mkdir(parents=True, exist_ok=True)
-    write_text(said, wanted)
+    write_text(plan_path, wanted)
     return folder

@@ -51,21 +51,21 @@ def read_label(path: Path) -> dict[str, Any]:
 def read_answer(place: Path) -> dict[str, Any]:
     """The answer.json in `place`, parsed; an unknown error is NaN. Raises StudyError."""
     try:
-        said = load_json(read_text(place / ANSWER), with_nan=True)
+        document = load_json(read_text(place / ANSWER), with_nan=True)
     except ValueError as problem:
         raise UnusableFileError(place / ANSWER, "answer of a diagnosis", (f"this is not JSON: {problem}",)) from problem
-    if not isinstance(said, dict):
+    if not isinstance(document, dict):
         raise UnusableFileError(place / ANSWER, "answer of a diagnosis", ("it holds no object",))
-    return said
+    return document
 
 
-def answers_sealed_case(label: dict[str, Any], said: dict[str, Any]) -> bool:
+def answers_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> bool:
     """Whether an answer belongs to the sealed files and comes from a process that had not imported the challenge.
     True for an answer of a process that died: it contains nothing."""
-    if DIED in said:
+    if DIED in answer:
         return True
-    return said.get("knows_the_challenge") is False and all(
-        key in said and said[key] == label[key] for key in HASHED if key in label
+    return answer.get("knows_the_challenge") is False and all(
+        key in answer and answer[key] == label[key] for key in HASHED if key in label
     )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from analysis.evaluation.proof.wording import concealed_text, figure_text, said_text, strength_text
+from analysis.evaluation.proof.wording import answer_text, concealed_text, figure_text, strength_text
 from study.evaluation.bank.prove import Proof
 
 
@@ -15,7 +15,7 @@ def proof_lines(proof: Proof) -> Iterator[str]:
     for miss in score.misses:
         strength = strength_text(miss)
         drawn = f"{concealed_text(miss)}{f' at {strength}' if strength else ''}"
-        yield f"  {miss.number:5d} {miss.kind}, {miss.bank}: {drawn} -> {said_text(miss)}"
+        yield f"  {miss.number:5d} {miss.kind}, {miss.bank}: {drawn} -> {answer_text(miss)}"
     yield from control_lines(proof)
     yield ""
     for figure in score.figures:

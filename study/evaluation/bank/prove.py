@@ -10,13 +10,14 @@ from analysis.evaluation.proof.controlled import ControlOutcome
 from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Concealed, Outcome
 from analysis.evaluation.proof.score import Score, score
+from study.errors import resumable
 from study.evaluation.bank.ask_engine import is_answered
 from study.evaluation.bank.follow_up import NEXT, follow_up
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.bank.seal_cases import BankPlan, drawable_cases, read_case_names, redraw_recording, seal_cases
-from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, resumable, reveal_bank
+from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, reveal_bank
 
 
 def reveal_cases(folder: ProofFolder, cases: int) -> tuple[Outcome, ...]:
@@ -24,7 +25,7 @@ def reveal_cases(folder: ProofFolder, cases: int) -> tuple[Outcome, ...]:
     return reveal_bank(folder, cases, outcome_of)
 
 
-def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
+def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
     """Pair a revealed label with the answer of the diagnosis."""
     concealed = tuple(
         Concealed(each["effect"], each["place"], each["axis"], {**each["values"], **each["unseen"]})
@@ -40,9 +41,9 @@ def outcome_of(label: dict[str, Any], said: dict[str, Any]) -> Outcome:
         concealed=concealed,
         strengths=tuple(label["strengths"]),
         adds=label["adds"],
-        said=None if "failed" in said else diagnosis_from_json(said["diagnosis"]),
-        channel_errors=said.get("channel_errors", {}),
-        seconds=said.get("cpu_seconds", float("nan")),
+        diagnosis=None if "failed" in answer else diagnosis_from_json(answer["diagnosis"]),
+        channel_errors=answer.get("channel_errors", {}),
+        seconds=answer.get("cpu_seconds", float("nan")),
     )
 
 
@@ -72,7 +73,7 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
     """Run or continue the bank in the folder `path`. Resumable. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
     numbers = [each.number for each in drawable_cases(plan)]
-    with resumable(path):
+    with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = read_case_names(folder, numbers)
         _answer_cases(folder, plan, options, dict(zip(names, numbers, strict=True)), on_progress)

@@ -1,13 +1,10 @@
 """Steps that all sealed banks share: answer the open cases, check the seals, reveal the labels."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, TypeVar
 
-from study.errors import LeftError
 from study.evaluation.bank.ask_engine import Workers, ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import ANSWER, ProofFolder
 from study.evaluation.bank.proof_seals import (
@@ -40,20 +37,6 @@ class BankOptions:
     @property
     def answering(self) -> Workers:
         return self.workers if self.executor is None else self.executor
-
-
-@contextmanager
-def resumable(path: Path) -> Iterator[None]:
-    """Turn a keyboard interruption into LeftError, which says that the same call continues."""
-    try:
-        yield
-    except KeyboardInterrupt as interruption:
-        raise LeftError(
-            "Interrupted",
-            "The bank is not finished.",
-            "Run the same command again: it goes on where it stopped.",
-            saved=f"All that is sealed and answered so far is in {path}.",
-        ) from interruption
 
 
 def answer_bank(
@@ -97,10 +80,10 @@ def reveal_bank(
         place = folder.open / label["name"]
         if label["number"] >= cases or not (place / ANSWER).exists():
             continue
-        said = read_answer(place)
-        if not answers_sealed_case(label, said):
+        answer = read_answer(place)
+        if not answers_sealed_case(label, answer):
             broken.append(path.name)
-        found.append(outcome_of(label, said))
+        found.append(outcome_of(label, answer))
     if broken:
         raise broken_seal_error(broken, folder.path)
     return tuple(found)

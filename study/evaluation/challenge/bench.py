@@ -26,7 +26,7 @@ class Oscillators:
     def and_one(
         self, frequency_hz: float, mass_kg: float, damping_ratio: float, direction: FloatArray
     ) -> "Oscillators":
-        """With one more oscillator."""
+        """Copy with one more oscillator."""
         return Oscillators(
             np.append(self.frequency_hz, frequency_hz),
             np.append(self.mass_kg, mass_kg),

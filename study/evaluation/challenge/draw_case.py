@@ -104,8 +104,8 @@ def draw_case(
     def again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
         further = further_plan(command, kind, rig)
         heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
-        seen = read(device.sensor, *motion(heavier, further.command), RATE_HZ, np.random.default_rng([seed, noise]))
-        return replace(make_recording(label, further, *seen, rig), meta=added_mass_meta(added_kg))
+        readings = read(device.sensor, *motion(heavier, further.command), RATE_HZ, np.random.default_rng([seed, noise]))
+        return replace(make_recording(label, further, *readings, rig), meta=added_mass_meta(added_kg))
 
     return Case(recording, model, truth, again, visibility(bare, device, (free, moved), rig) if hidden else 0.0)
 

@@ -58,7 +58,7 @@ class HiddenEffect:
     """Name in the vocabulary; a name of its own for a decoy."""
     place: Place
     of_axis: bool
-    """It acts on one axis; otherwise on all."""
+    """Whether the effect acts on one axis; otherwise on all."""
     draw: Callable[[EffectContext], dict[str, float]]
     """Parameters by name: those of the vocabulary, and what else `build` needs."""
     build: Callable[[Device, int, Values], Device]

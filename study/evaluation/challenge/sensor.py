@@ -94,7 +94,7 @@ def _at_other_times(samples: FloatArray, ppm: float, late: float) -> FloatArray:
 
 
 def _last_kept(samples: int, lost: float, random: np.random.Generator) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """For every sample the index of the last one that was not lost."""
+    """Index of the last sample that was not lost, for every sample."""
     there = random.random(samples) >= lost
     there[0] = True
     kept: np.ndarray[tuple[int], np.dtype[np.int64]] = np.maximum.accumulate(np.where(there, np.arange(samples), 0))

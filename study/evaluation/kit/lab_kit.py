@@ -75,5 +75,5 @@ def seal_of(path: Path) -> Path:
 def read_sealed_hash(path: Path) -> str:
     """Hash in the seal file beside the table; empty where there is none. Raises CannotReadError."""
     seal = seal_of(path)
-    said = read_text(seal).split() if seal.exists() else []
-    return said[0].lower() if said else ""
+    texts = read_text(seal).split() if seal.exists() else []
+    return texts[0].lower() if texts else ""

@@ -105,18 +105,20 @@ def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
     """What the hash was compared with, in words. Raises StudyError where it differs."""
     beside = seal_of(path)
     if seal is None:
-        said, who = read_sealed_hash(path), f"{beside.name} says"
+        sealed_digest, who = read_sealed_hash(path), f"{beside.name} says"
         how = (
             f"compared only with {beside.name} beside them, which can be written anew together with the table: give "
             "--seal the hash that was handed over before the diagnoses"
         )
     else:
-        said, who, how = _hash(seal), "--seal gives", "the hash that --seal gives"
-    if said == digest:
+        sealed_digest, who, how = _hash(seal), "--seal gives", "the hash that --seal gives"
+    if sealed_digest == digest:
         return how
     raise StudyError(
         "The labels are not those that were sealed",
-        f"{path.name} has the hash {digest}; {who} {said}." if said else f"There is no seal in {beside.name}.",
+        f"{path.name} has the hash {digest}; {who} {sealed_digest}."
+        if sealed_digest
+        else f"There is no seal in {beside.name}.",
         "Score the table as it was sealed before the diagnoses; changes made to it since cannot be trusted.",
         saved=UNSCORED,
     )
@@ -124,9 +126,9 @@ def _require_sealed(path: Path, digest: str, seal: str | None) -> str:
 
 def _hash(typed: str) -> str:
     """The hash in typed text, which may be the whole line of the seal file."""
-    said = (typed.split() or [""])[0].lower()
-    if re.fullmatch("[0-9a-f]{64}", said):
-        return said
+    first_word = (typed.split() or [""])[0].lower()
+    if re.fullmatch("[0-9a-f]{64}", first_word):
+        return first_word
     raise WrongUseError(
         "That is no SHA-256",
         f"--seal gives '{typed}'; a hash has 64 digits from 0 to 9 and a to f.",

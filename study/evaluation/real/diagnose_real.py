@@ -54,14 +54,16 @@ class _Read:
 
 def report_crash(wanted: RealRecording, crash: Exception) -> RealDiagnosis:
     """Result for a recording at which the program crashed."""
-    said = f"{type(crash).__name__}: {crash}".rstrip(": .")
-    broken = f"The program crashed at this recording ({said}). That is a fault of the program; the others are answered."
+    error = f"{type(crash).__name__}: {crash}".rstrip(": .")
+    broken = (
+        f"The program crashed at this recording ({error}). That is a fault of the program; the others are answered."
+    )
     return RealDiagnosis(_refusal(wanted, broken), None, wanted.parents)
 
 
 def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on_progress: Progress) -> RealDiagnosis:
     """Diagnose one recording. One that cannot be diagnosed is returned as refused, with the reason. Raises only
-    LeftError."""
+    UserInterruptError."""
     parents = wanted.parents
     try:
         read = _read(wanted, (time_left, guard), on_progress)
@@ -86,7 +88,7 @@ def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on
     pair = None if read.before is None else _pair(wanted, read, found)
     objections = (
         *diagnosis.objections,
-        *(said for each in wanted.tests for said in each.source.map.diagnosis.objections),
+        *(objection for each in wanted.tests for objection in each.source.map.diagnosis.objections),
     )
     answer = replace(answer, further=further, pair=pair, objections=objections)
     return RealDiagnosis(answer if pair is None else _not_whole(answer, pair), found, parents)
@@ -98,11 +100,11 @@ def _not_whole(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
     left, missed = pair.with_effects, pair.expected_left
     if answer.verdict != "explained" or left is None or missed is None or left <= EXPLAINED_ERROR * missed:
         return answer
-    said = (
+    text = (
         f"Still unexplained: {100 * left:.3g} % of the signal are left on held-out data, where the model missed "
         f"{100 * missed:.3g} % before the change."
     )
-    return replace(answer, verdict="partly_explained", left=said, pair=replace(pair, verdict="partly_explained"))
+    return replace(answer, verdict="partly_explained", left=text, pair=replace(pair, verdict="partly_explained"))
 
 
 def import_real_recording(found: FoundMap) -> Recording:
@@ -195,12 +197,12 @@ def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherT
             prediction_error(recording, model, "all") for model in (_require_retuned(found), found.improved)
         )
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
-        said = problem.happened if isinstance(problem, StudyError) else f"{problem}."
-        return FurtherTest(test.name, title, "", None, None, problem=said)
+        text = problem.happened if isinstance(problem, StudyError) else f"{problem}."
+        return FurtherTest(test.name, title, "", None, None, problem=text)
     without, with_it = (each.with_gain if free else each.as_it_is for each in (retuned, after))
-    said = after.error + (", one factor fitted" if free else "")
+    text = after.error + (", one factor fitted" if free else "")
     stretches = () if free or after.error == "predicted force" else _whole(test.name, recording, retuned, after)
-    return FurtherTest(test.name, title, said, without, with_it, stretches)
+    return FurtherTest(test.name, title, text, without, with_it, stretches)
 
 
 def _whole(

@@ -97,7 +97,7 @@ def _seal_injection(folder: ProofFolder, carried: Sequence[Carrier], number: int
     write_recording(place / CLEAN / RECORDING, sound, precision="float64")
     write_mechanical_model(place / MODEL, carrier.model)
     write_text(place / SETTINGS, settings_text((), PROCESSOR_S))
-    said = {
+    document = {
         "name": name,
         "number": number,
         "seed": seed,
@@ -112,7 +112,7 @@ def _seal_injection(folder: ProofFolder, carried: Sequence[Carrier], number: int
         "others_sha256": others_sha256(place),
         "salt": secrets.token_hex(16),
     }
-    write_text(label, json.dumps(said, indent=1, allow_nan=False) + "\n")
+    write_text(label, json.dumps(document, indent=1, allow_nan=False) + "\n")
     return name
 
 
@@ -152,7 +152,7 @@ def run_injections(
     labels = [read_label(folder.label(number)) for number in range(len(names))]
     answers = [read_answer(folder.open / name) for name in names]
     if broken := [
-        label["name"] for label, said in zip(labels, answers, strict=True) if not answers_sealed_case(label, said)
+        label["name"] for label, answer in zip(labels, answers, strict=True) if not answers_sealed_case(label, answer)
     ]:
         raise broken_seal_error(broken, folder.path)
-    return tuple(read_outcome(label, said) for label, said in zip(labels, answers, strict=True))
+    return tuple(read_outcome(label, answer) for label, answer in zip(labels, answers, strict=True))

@@ -10,6 +10,7 @@ from analysis.diagnosis.contrast.joint_products import weights_of
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.stream import Base
 from analysis.diagnosis.data.observed_parts import part_of, parts_of
+from equalizer.signals.joining import concatenate, concatenate_if_all
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
@@ -59,24 +60,15 @@ def _of_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recordi
     first = pieces[0]
     return replace(
         first,
-        command=_concatenate([piece.command for piece in pieces]),
-        response=_concatenate([piece.response for piece in pieces]),
-        position=_concatenate_known([piece.position for piece in pieces]),
-        excitation=_concatenate_known([piece.excitation for piece in pieces]),
-        condition=_concatenate_known([piece.condition for piece in pieces]),
+        command=concatenate([piece.command for piece in pieces]),
+        response=concatenate([piece.response for piece in pieces]),
+        position=concatenate_if_all([piece.position for piece in pieces]),
+        excitation=concatenate_if_all([piece.excitation for piece in pieces]),
+        condition=concatenate_if_all([piece.condition for piece in pieces]),
         time_s=None,
         segments=tuple(segments) or (Segment(0, int(stops[-1]), "noise", 0.0),),
         meta={**recording.meta, "parts": named},
     )
-
-
-def _concatenate(signals: Sequence[Signal]) -> Signal:
-    return replace(signals[0], samples=np.vstack([signal.samples for signal in signals]))
-
-
-def _concatenate_known(signals: Sequence[Signal | None]) -> Signal | None:
-    known = [signal for signal in signals if signal is not None]
-    return _concatenate(known) if len(known) == len(signals) else None
 
 
 def _half_with_lead(recording: Recording, start: int, stop: int) -> Recording:

@@ -59,8 +59,8 @@ def _kept(place: Path, real_recording: RealRecording, seconds: float | None) -> 
 
 
 def _files_in(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
-    said = origin.get("parents")
-    parents = said if isinstance(said, list) else []
+    stored = origin.get("parents")
+    parents = stored if isinstance(stored, list) else []
     return {(str(parent.get("file")), str(parent.get("sha256"))) for parent in parents if isinstance(parent, dict)}
 
 
@@ -82,18 +82,18 @@ def _setting_changes(origin: Mapping[str, Any], seconds: float | None) -> Iterat
         yield f"--seconds was {_seconds(then)}, and is {_seconds(seconds)}"
 
 
-def _seconds(said: float | None) -> str:
-    return "left out" if said is None else f"{said:g}"
+def _seconds(limit_s: float | None) -> str:
+    return "left out" if limit_s is None else f"{limit_s:g}"
 
 
 def _made_otherwise(out: Path, outdated: Sequence[_Kept]) -> StudyError:
-    said = (f"{each.place.relative_to(out) / ANSWER_NAME}: {', '.join(each.changes)}." for each in outdated)
+    texts = (f"{each.place.relative_to(out) / ANSWER_NAME}: {', '.join(each.changes)}." for each in outdated)
     places = [str(each.place) for each in outdated]
     if (injected := out / INJECTED_NAME).exists():
         places.append(f"{injected}, which was made with them")
     return StudyError(
         "Answers that are there were made from something else",
-        " ".join(said),
+        " ".join(texts),
         f"Choose another --out; or, to have them answered anew, move away {'; '.join(places)}.",
         saved="The old answers are kept as they are, and nothing was written.",
     )

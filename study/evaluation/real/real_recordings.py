@@ -15,7 +15,7 @@ from analysis.diagnosis.search.time_budget import CountedBudget
 from analysis.diagnosis.types import TimeBudget
 from analysis.evaluation.proof.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
-from study.errors import LeftError, StudyError, WrongUseError
+from study.errors import StudyError, UserInterruptError, WrongUseError, resumable
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
 from study.evaluation.real.inject_real import carriers, run_injections
@@ -71,7 +71,7 @@ def diagnose_folder(
     plan: RealPlan, on_progress: Progress, clock: Clock | None = None, executor: Executor | None = None
 ) -> WrittenReal:
     """Diagnose a folder and write page and table. `on_progress(step, share)`. executor: does it on its workers, which
-    may share no disk. Resumable after LeftError. Raises StudyError."""
+    may share no disk. Resumable after UserInterruptError. Raises StudyError."""
     if executor is not None and plan.seconds is not None:
         raise WrongUseError(
             "Seconds are of this computer's processor",
@@ -83,7 +83,8 @@ def diagnose_folder(
     time = clock or RealClock()
     kept = kept_answers(plan.out, found.recordings, plan.seconds)
     _make_writable(plan.out)
-    try:
+    saved = f"What was answered so far is in {plan.out}."
+    with resumable("Not all recordings were diagnosed.", saved, also=(UserInterruptError,)):
         if executor is None:
             answers = _answers(plan, found, kept, on_progress, time)
         else:
@@ -93,13 +94,6 @@ def diagnose_folder(
         return write_real(
             plan.out, RealResults(answers, found.troubles, injected), local_time(time.utc(), machine_zone)
         )
-    except (KeyboardInterrupt, LeftError) as interruption:
-        raise LeftError(
-            "Interrupted",
-            "Not all recordings were diagnosed.",
-            "Run the same command again: it goes on where it stopped.",
-            saved=f"What was answered so far is in {plan.out}.",
-        ) from interruption
 
 
 def _found(plan: RealPlan) -> RealFolder:
@@ -246,7 +240,7 @@ def _write(folder: Path, done: RealDiagnosis, origin: Provenance) -> None:
 
 @contextmanager
 def _new_folder_in_parents(folder: Path) -> Iterator[Path]:
-    """As `new_folder`, with its parents. Raises StudyError."""
+    """Open a new folder as `new_folder` does, and create its parents. Raises StudyError."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:

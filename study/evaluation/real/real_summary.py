@@ -21,13 +21,13 @@ def _line(real_answer: RealAnswer) -> str:
     named = f": {', '.join(real_answer.effects)}" if real_answer.effects else ""
     if real_answer.verdict == "unexplained" and real_answer.candidates:
         named = f", best candidate (not confirmed) {real_answer.candidates[0].effect}"
-    said = f"{real_answer.folder}, {real_answer.recording}: {VERDICT_WORDS[real_answer.verdict]}{named}"
+    text = f"{real_answer.folder}, {real_answer.recording}: {VERDICT_WORDS[real_answer.verdict]}{named}"
     if real_answer.held_out is None:
-        return f"{said}. {real_answer.answer}"
+        return f"{text}. {real_answer.answer}"
     errors = real_answer.held_out
     after = f", with what was found {error_text(errors.after)}" if real_answer.effects else ""
     box = "" if real_answer.black_box is None else f", black box {error_text(real_answer.black_box)}"
     return (
-        f"{said}. Held out: as given {error_text(errors.before)}, re-tuned {error_text(errors.retuned)}{after}{box} "
+        f"{text}. Held out: as given {error_text(errors.before)}, re-tuned {error_text(errors.retuned)}{after}{box} "
         f"({real_answer.seconds:.0f} s)."
     )

@@ -15,7 +15,7 @@ from equalizer.identification.state_space.held_out import HeldOut, validate_on_t
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from study.devices.opening import FRICTIONLESS
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, UserInterruptError, resumable
 from study.evaluation.reproduction.reproduce_baselines import play_baselines
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
 from study.evaluation.reproduction.reproduce_recordings import CachedRecording, RecordingRequest, record_or_load
@@ -38,7 +38,7 @@ class ReproducedModel:
     """A model behind figure 5: identified once from its recording and reused by the next run."""
 
     model: IdentifiedModel
-    """It includes the spring, so that playback under the same spring needs no other account of it."""
+    """Includes the spring, so that playback under the same spring needs no separate compensation."""
     tested: HeldOut | None
 
     def as_used_model(self, name: str) -> UsedModel:
@@ -86,24 +86,18 @@ CENTRE_NAME, SLICK_NAME, HAND_NAME = "centre", "frictionless", "hand"
 
 
 def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]) -> WrittenReproduction:
-    """Make all figures. `on_progress(share)`, 0 to 1. Resumable after LeftError. Raises StudyError."""
+    """Make all figures. `on_progress(share)`, 0 to 1. Resumable after UserInterruptError. Raises StudyError."""
     wanted = _recordings_to_make(plan)
     models = _model_names()
     steps = Steps(_weights(plan, wanted, models), on_progress)
-    try:
+    saved = f"Sessions, recordings and models so far are in {plan.out}."
+    with resumable("The reproduction is not finished.", saved, also=(UserInterruptError,)):
         _make_folders(plan)
         recordings = {name: record_or_load(plan, each, steps.of(f"recording {name}")) for name, each in wanted.items()}
         collected = _sit(plan, steps)
         identified = {name: identify_or_load(plan, recordings[name], steps.of(f"model {name}")) for name in models}
         results = _results(plan, recordings, identified, collected, steps)
         return write_reproduction_folder(plan, results, steps.of("writing"))
-    except (KeyboardInterrupt, LeftError) as interruption:
-        raise LeftError(
-            "Interrupted",
-            "The reproduction is not finished.",
-            "Run the same command again: it goes on where it stopped.",
-            saved=f"Sessions, recordings and models so far are in {plan.out}.",
-        ) from interruption
 
 
 def _recordings_to_make(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
@@ -191,7 +185,7 @@ def _results(
         models=tuple(each.as_used_model(name) for name, each in identified.items()),
         tested=identified[CENTRE_NAME].tested,
         tested_frictionless=identified[SLICK_NAME].tested,
-        remarks=tuple(f"{name}: {said}" for name, recording in recordings.items() for said in recording.warnings),
+        remarks=tuple(f"{name}: {warning}" for name, recording in recordings.items() for warning in recording.warnings),
         sources=tuple(recording.path for recording in recordings.values()),
         protocol_hash=collected.protocol_hash,
     )

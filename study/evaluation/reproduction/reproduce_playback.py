@@ -23,7 +23,7 @@ from study.session.stimulus.limits import limits_of_recording
 from study.store.formats.protocol_files import read_recording_protocol
 
 AXES = ("ax", "ay", "az")
-OF_CAP = 0.93
+PEAK_OVER_CAP = 0.93
 """Peak force of everything that is played, as a fraction of the cap: far above friction, below the cap."""
 PERIODS = 2
 """Periods played; the first lets the transient decay."""
@@ -36,7 +36,7 @@ Driver = Callable[[Signal], FloatArray]
 
 @dataclass(frozen=True, slots=True)
 class Playing:
-    """One row: place, device, and how the wanted signal is turned into forces."""
+    """One row of the figure: place, device, and how the wanted signal is converted to forces."""
 
     name: str
     driver: Driver
@@ -62,7 +62,7 @@ def play_row(plan: ReproductionPlan, playing: Playing) -> PlayedResponse:
         hand_on_handle=playing.hand,
         place_m=playing.place_m,
     )
-    peak_n = OF_CAP * protocol.safety.stimulus_cap_n
+    peak_n = PEAK_OVER_CAP * protocol.safety.stimulus_cap_n
     with contextlib.closing(open_device(playing.device, settings, VirtualClock(), plan.seed)) as device:
         return _play_axes(plan, playing, device, peak_n)
 

@@ -50,8 +50,8 @@ class Arrays:
 
 def left_out(array: Array) -> str:
     """Placeholder for an array that is not read, with its kind or its problem as text; empty for all other arrays."""
-    said = array.item() if array.dtype.kind == "O" and array.size == 1 else ""
-    return said if isinstance(said, str) else ""
+    text = array.item() if array.dtype.kind == "O" and array.size == 1 else ""
+    return text if isinstance(text, str) else ""
 
 
 def read_arrays(path: Path, table: CsvMap) -> Arrays:

@@ -208,8 +208,8 @@ def _comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
     found = [line for line in below if line[0] > first]
     for number, line in below if layout.delimiter != " " else ():
         fields = split_row(line, layout.delimiter)
-        said = any(fields[1:]) if number > first else holds_number(fields[1:], layout.decimal)
-        if len(fields) >= width > 1 and said:
+        is_data = any(fields[1:]) if number > first else holds_number(fields[1:], layout.decimal)
+        if len(fields) >= width > 1 and is_data:
             raise ValueError(
                 f"line {number} begins with '{line.lstrip()[0]}' as a comment does, but has the fields of a row; "
                 "correct it, or take it out"

@@ -35,8 +35,8 @@ _SAVED_INSTEAD = {
 
 def instead(name: str, what: str) -> str:
     """Advice by the kind of array: how to convert it in Matlab before saving; empty where nothing general is known."""
-    for said, statement in _SAVED_INSTEAD.items():
-        if said in what:
+    for problem, statement in _SAVED_INSTEAD.items():
+        if problem in what:
             return f"in Matlab: {statement.format(name=name, plain=name.replace('.', '_'))}"
     return ""
 

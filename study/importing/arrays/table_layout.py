@@ -185,8 +185,10 @@ def _header_and_units(
 
 def _are_units(fields: Sequence[str]) -> bool:
     """Whether each field is a known unit, in brackets or not, or empty; or all texts are in brackets."""
-    said = [field for field in fields if field.lower() not in _UNITLESS]
-    return bool(said) and (all(is_unit(_bare(field)) for field in said) or all(_bare(field) != field for field in said))
+    stated = [field for field in fields if field.lower() not in _UNITLESS]
+    return bool(stated) and (
+        all(is_unit(_bare(field)) for field in stated) or all(_bare(field) != field for field in stated)
+    )
 
 
 def _bare(field: str) -> str:
@@ -204,12 +206,12 @@ def with_units(header: Sequence[str], units: Sequence[str] | None) -> list[str]:
         return list(header)
     found = []
     for name, field in zip(header, units, strict=True):
-        stated, said = _bare(field), name_signal(name)
+        stated, parsed = _bare(field), name_signal(name)
         unit = plain_unit(stated)
         if unit.lower() in _UNITLESS:
             found.append(name)
             continue
-        if said.unit and said.sure and is_unit(unit) and parse_unit(said.unit) != parse_unit(unit):
-            raise ValueError(f"its header says {said.unit} in '{name}', and its row of units says {unit}")
-        found.append(name if said.unit == unit else f"{name} [{stated if is_peak_value(stated) else unit}]")
+        if parsed.unit and parsed.sure and is_unit(unit) and parse_unit(parsed.unit) != parse_unit(unit):
+            raise ValueError(f"its header says {parsed.unit} in '{name}', and its row of units says {unit}")
+        found.append(name if parsed.unit == unit else f"{name} [{stated if is_peak_value(stated) else unit}]")
     return found

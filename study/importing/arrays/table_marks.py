@@ -84,8 +84,8 @@ def _is_no_name(header: str, decimal: str, columns: int) -> bool:
     above `0,1`), or a remark of several words (`Rig 3`) above a single column."""
     if decimal != ",":
         return False
-    said = name_signal(header)
-    remark = columns == 1 and len(header.split()) > 1 and not said.unit and not said.quantity
+    parsed = name_signal(header)
+    remark = columns == 1 and len(header.split()) > 1 and not parsed.unit and not parsed.quantity
     return ("," in header and '"' not in header) or remark
 
 

@@ -168,16 +168,16 @@ def _table(name: str, rows: Sequence[tuple[int, Sequence[Any]]], settings: CsvMa
     # Numbers of a sheet have no decimal sign; texts that are numbers may have either.
     pointed = any(isinstance(cell, float) and cell % 1 for _, cells in rows for cell in cells)
     decimal = settings.decimal or ("." if pointed else "")
-    said = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"
+    text = "" if settings.sheet else "; to read another sheet alone, the map names it: sheet = ... under [csv]"
     try:
         made = read_lines(
             [_line(number, cells, width, (percents, decimal or ".")) for number, cells in rows],
             replace(settings, delimiter=_DELIMITER, decimal=decimal),
         )
     except ValueError as problem:
-        raise ValueError(f"sheet '{name}', {problem}{said}") from problem
+        raise ValueError(f"sheet '{name}', {problem}{text}") from problem
     faulty = {
-        key: np.array(FaultyColumn(f"sheet '{name}', {array.item()}{said}"), dtype=object)
+        key: np.array(FaultyColumn(f"sheet '{name}', {array.item()}{text}"), dtype=object)
         for key, array in made.by_name.items()
         if array.dtype.kind == "O"
     }

@@ -92,7 +92,7 @@ class Namespace:
         if array.dtype.kind not in "fiub":
             what = "complex numbers" if array.dtype.kind == "c" else "text or objects"
             known = f": it is {problem}" if problem else ""
-            mend = f"; {said}" if (said := instead(name, problem)) else ""
+            mend = f"; {statement}" if (statement := instead(name, problem)) else ""
             raise ImportProblemError(f"the array '{name}' in {self.where} holds {what}, not real numbers{known}{mend}")
         self.budget.spend(array.size, name)
         with np.errstate(all="ignore"):

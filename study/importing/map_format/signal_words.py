@@ -119,29 +119,29 @@ def name_signal(header: str) -> ParsedName:
     name, unit = unit_in(header)
     foreign = max((word for word in FOREIGN_WORDS if word in name.lower()), key=len, default="")
     word = quantity_in(name) if FOREIGN_WORDS.get(foreign, "time") == "time" else FOREIGN_WORDS[foreign]
-    told = unit or unit_at_end(name)[1]
+    stated = unit or unit_at_end(name)[1]
     try:
-        known = parse_unit(told)
+        known = parse_unit(stated)
     except UnknownUnitError:
         return ParsedName(header, name, "", word, _unknown(unit) if unit else "")
     by_unit = "time" if known.si == "s" else quantity_of(known.si)
     if by_unit == known.si != UNSTATED and word not in ("setting", *QUANTITY_UNITS):
-        return ParsedName(header, name, told, by_unit, f"what is measured in {told} is not known")
+        return ParsedName(header, name, stated, by_unit, f"what is measured in {stated} is not known")
     if not word:
         doubt = (
             ""
-            if unit or told in _SURE or "/" in told
-            else f"whether {told} is its unit is not sure, for no word says what it is"
+            if unit or stated in _SURE or "/" in stated
+            else f"whether {stated} is its unit is not sure, for no word says what it is"
         )
-        return ParsedName(header, name, told, by_unit, doubt)
+        return ParsedName(header, name, stated, by_unit, doubt)
     try:
         check_quantity(word, known)
     except UnknownUnitError:
         if SEVERAL_MEANINGS & set(words_in(name)):
-            return ParsedName(header, name, told, by_unit, "")
-        doubt = f"its name says {word}, its unit, {told}, says {by_unit}{force_hint(word, known)}"
-        return ParsedName(header, name, told, by_unit, doubt)
-    return ParsedName(header, name, told, word, "")
+            return ParsedName(header, name, stated, by_unit, "")
+        doubt = f"its name says {word}, its unit, {stated}, says {by_unit}{force_hint(word, known)}"
+        return ParsedName(header, name, stated, by_unit, doubt)
+    return ParsedName(header, name, stated, word, "")
 
 
 def _unknown(unit: str) -> str:
@@ -153,16 +153,16 @@ def roles_of(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
     """Roles by quantity: forces are commands, or voltages or currents if there are none, or else channels named as
     commands; accelerations and velocities are responses, or positions if there are no others; other known quantities
     are conditions. None if something is open or contradicted by a name (`open_roles` says what)."""
-    return None if open_roles(columns) else [role for role in _roles(columns, _said_roles(columns)) if role]
+    return None if open_roles(columns) else [role for role in _roles(columns, _stated_roles(columns)) if role]
 
 
 def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
     """What names and quantities leave open, one clause each; empty if they determine all roles."""
-    every_said = _said_roles(columns)
+    every_said = _stated_roles(columns)
     roles = _roles(columns, every_said)
     found = []
-    for column, role, said in zip(columns, roles, every_said, strict=True):
-        if role == "helper" or (role and said not in ("", role)):
+    for column, role, stated in zip(columns, roles, every_said, strict=True):
+        if role == "helper" or (role and stated not in ("", role)):
             found.append(f"whether '{column.header}' is to be compared, or is only a help to others")
         elif not role and column.quantity in _FEEDS:
             found.append(f"whether '{column.header}' is the command")
@@ -180,32 +180,32 @@ def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
 def propose_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     """Roles by names, then by quantity; empty if open. A reference is a helper, and so are currents and voltages
     beside a force."""
-    said = _said_roles(columns)
-    return [told or role for told, role in zip(said, _roles(columns, said), strict=True)]
+    all_stated = _stated_roles(columns)
+    return [stated or role for stated, role in zip(all_stated, _roles(columns, all_stated), strict=True)]
 
 
 def may_be_imposed(columns: Sequence[ParsedName]) -> bool:
     """Whether there are only forces and positions, and no name says which of them is the command."""
     quantities = {column.quantity for column in columns}
-    plain = not {"command", "helper", "response"} & set(_said_roles(columns))
+    plain = not {"command", "helper", "response"} & set(_stated_roles(columns))
     return plain and bool(quantities & set(_DRIVES) and quantities & set(_PLACES)) and not quantities & set(_MOTIONS)
 
 
-def _roles(columns: Sequence[ParsedName], said: Sequence[_Role]) -> list[_Role]:
-    by_quantity = _by_quantity(columns, said)
-    return [_role(column, told, by_quantity) for column, told in zip(columns, said, strict=True)]
+def _roles(columns: Sequence[ParsedName], stated: Sequence[_Role]) -> list[_Role]:
+    by_quantity = _by_quantity(columns, stated)
+    return [_role(column, role, by_quantity) for column, role in zip(columns, stated, strict=True)]
 
 
-def _role(column: ParsedName, said: _Role, by_quantity: Mapping[str, SignalRole]) -> _Role:
-    if said == "condition":
+def _role(column: ParsedName, stated: _Role, by_quantity: Mapping[str, SignalRole]) -> _Role:
+    if stated == "condition":
         return "condition"
-    if said == "command" and column.quantity in ("", "1") and "command" not in by_quantity.values():
+    if stated == "command" and column.quantity in ("", "1") and "command" not in by_quantity.values():
         return "command"
     known = column.quantity not in ("", "1", "time", *_DRIVES, *_FEEDS, *_MOTIONS, *_PLACES)
     return by_quantity.get(column.quantity, "condition" if known else "")
 
 
-def _said_roles(columns: Sequence[ParsedName]) -> list[_Role]:
+def _stated_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     firsts = {column.name.split("_")[0].lower() for column in columns}
     short = _SHORT if {"u", "y"} <= firsts and "x" not in firsts else {}
     found: list[_Role] = []
@@ -217,8 +217,8 @@ def _said_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     return found
 
 
-def _by_quantity(columns: Sequence[ParsedName], said: Sequence[_Role]) -> dict[str, SignalRole]:
-    quantities = {column.quantity for column, told in zip(columns, said, strict=True) if told != "condition"}
+def _by_quantity(columns: Sequence[ParsedName], stated: Sequence[_Role]) -> dict[str, SignalRole]:
+    quantities = {column.quantity for column, role in zip(columns, stated, strict=True) if role != "condition"}
     answers = _MOTIONS if quantities & set(_MOTIONS) else _PLACES
     by_quantity: dict[str, SignalRole] = {}
     if quantities & set(_DRIVES):

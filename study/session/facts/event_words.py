@@ -43,12 +43,12 @@ def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...
     counted = {_key(event) for event in events if isinstance(event, TrialMeasured)}
     presented = {_key(e): e for e in events if isinstance(e, TrialPresented) and _key(e) in counted}
     lines: list[str] = []
-    said = ""
+    text = ""
     for event in events:
         date, time, offset = local_parts(event.utc, zone)
         day = f"{date} (times are UTC {offset})" if offset else ""
-        if day and day != said:
-            said = day
+        if day and day != text:
+            text = day
             lines.append(day)
         lines.append(f"{time or date}  {_describe(event, presented)}")
     return tuple(lines)
@@ -63,7 +63,7 @@ def _describe(event: Event, presented: dict[_Key, TrialPresented]) -> str:
     """The sentence for an event. presented: the trials that count."""
     match event:
         case TrialPresented():
-            return _describe_presented(event, told=_key(event) in presented)
+            return _describe_presented(event, with_direction=_key(event) in presented)
         case AnswerGiven():
             return _describe_answer(event, presented.get(_key(event)))
         case TrialMeasured():
@@ -149,20 +149,20 @@ def _describe_sitting(event: SessionOpened | SessionResumed | SessionInterrupted
             return "The session is finished."
 
 
-def _describe_presented(event: TrialPresented, told: bool) -> str:
+def _describe_presented(event: TrialPresented, with_direction: bool) -> str:
     again = f", attempt {event.attempt + 1}" if event.attempt else ""
     what = f"{event.level_n:.3f} N at {event.frequency_hz:g} Hz"
-    if told:
+    if with_direction:
         shown = f"interval {event.direction}" if event.phase is Phase.DETECTION else f"direction {event.direction}"
         what = f"{shown}, {what}"
     return f"{_place(event)} ({event.phase.value}{again}): {what}."
 
 
 def _describe_answer(event: AnswerGiven, presented: TrialPresented | None) -> str:
-    said = f"Answer {event.answer} after {event.response_time_s:.2f} s"
+    text = f"Answer {event.answer} after {event.response_time_s:.2f} s"
     if presented is None:
-        return f"{said}."
-    return f"{said}: {'right' if event.answer == presented.direction else 'wrong'}."
+        return f"{text}."
+    return f"{text}: {'right' if event.answer == presented.direction else 'wrong'}."
 
 
 def _describe_measured(event: TrialMeasured) -> str:
@@ -187,7 +187,7 @@ def _describe_form(event: FormFilled) -> str:
             outcome = "nothing speaks against taking part" if event.passed else "the sitting cannot go on"
             return f"The exclusion questions were answered{version}: {outcome}."
         case "setup":
-            how = "; ".join(f"{key.replace('_', ' ')}: {_one_line(said)}" for key, said in event.answers.items())
+            how = "; ".join(f"{key.replace('_', ' ')}: {_one_line(answer)}" for key, answer in event.answers.items())
             return f"Set-up. {how[:1].upper()}{how[1:]}." if how else "The set-up was gone through."
         case "questionnaire":
             asked = _count(len(event.answers), "question")

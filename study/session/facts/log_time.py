@@ -56,7 +56,7 @@ def elapsed_s(before: Moment, now: Moment) -> float:
 
 
 def clock_step(before: Moment, now: Moment, between_sittings: bool = False) -> ClockStep | None:
-    """By how much the wall clock was set between two entries, or None; without monotonic times only a step back can
+    """Time by which the wall clock was set between two entries, or None; without monotonic times only a step back can
     be detected."""
     wall_s = seconds_between(before.utc, now.utc)
     monotonic = before.monotonic_s is not None and now.monotonic_s is not None

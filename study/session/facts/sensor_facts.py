@@ -8,7 +8,7 @@ from study.session.facts.sitting_events import FACT
 
 @dataclass(frozen=True, config=FACT)
 class SensorFacts:
-    """From the onset until the handle was at rest."""
+    """What the log says of the accelerometer for one trial, from the onset until the handle was at rest."""
 
     packets: Count
     """Whole ones."""
@@ -17,15 +17,15 @@ class SensorFacts:
     spoiled_bytes: Count
     """That belonged to no whole packet."""
     restarts: Count
-    """How often its board began anew."""
+    """Number of restarts of the sensor's board."""
     ticks: Count = 0
-    """Of the recording; 0 where there is none."""
+    """Ticks of the recording; 0 where there is none."""
     unplaced_ticks: Count = 0
     """Those of them at which the acceleration is not known."""
     drift_ppm: Measured | None = None
-    """Of its clock beside the computer's, > 0: it is slow. Null where it was not fitted."""
+    """Drift of the sensor's clock against the computer's, > 0: it is slow. Null where it was not fitted."""
     longest_delay_s: Seconds | None = None
-    """Of an arrival, beyond the least, in the minutes to which the clock was fitted."""
+    """Longest delay of an arrival, beyond the shortest, in the minutes to which the clock was fitted."""
 
     @property
     def missing(self) -> float:

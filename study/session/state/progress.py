@@ -41,7 +41,8 @@ def _usual_trials(state: SessionState, run: Run) -> float:
 
 
 def _minutes_left(state: SessionState, trials_left: float) -> int | None:
-    """From the duration of answers, not from the clock: forms, instructions and pauses do not predict the rest."""
+    """Minutes left, estimated from the duration of answers, not from the clock: forms, instructions and pauses do not
+    predict the rest."""
     answered = state.answers - state.sitting.answers_before
     taken_s = [trial.response_time_s for trial in state.trials if trial.counts and trial.response_time_s is not None]
     if answered < FIRST or not taken_s:

@@ -34,7 +34,7 @@ ADVICE = "Close other programs, switch power saving off, and measure again."
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Of a real device's own loop, or of this program, which tried to wake up at every tick."""
+    """Lateness of a real device's own loop, or of this program, which tried to wake up at every tick."""
 
     median_ms: float
     p99_ms: float
@@ -45,7 +45,7 @@ class Lateness:
 
     @property
     def too_late(self) -> bool:
-        """For a real device. NaN counts as too late."""
+        """Whether a real device's loop is too late. NaN counts as too late."""
         return not self.p99_ms < LATE_TICKS * self.tick_ms
 
 
@@ -80,7 +80,7 @@ def judge_lateness(lateness: Lateness, simulated: bool) -> DeviceFinding:
 
 
 def judge_missed(missed_ticks: int, ticks: int, simulated: bool, load_per_processor: float | None) -> DeviceFinding:
-    """They are late ticks too, and have no limit of their own."""
+    """Judge missed ticks as late ticks: they have no limit of their own."""
     share, limit = missed_ticks / max(ticks, 1), _late_limit(load_per_processor)
     fine = share <= limit
     value = f"{missed_ticks} of {ticks} ({share:.2%})"

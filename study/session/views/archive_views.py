@@ -28,17 +28,17 @@ class SessionLine:
     runs: int
     standing: Standing
     remark: str = ""
-    """Such as why it cannot be read."""
+    """Such as the reason why the session cannot be read."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProtocolLine:
     name: str
-    """Or path: what `--protocol` takes."""
+    """Name or path, as `--protocol` takes it."""
     title: str
     locked: bool
     equalized: bool = False
-    """Its stimuli are accelerations: it needs a model of the device."""
+    """Whether its stimuli are accelerations, which need a model of the device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +108,6 @@ class DiagnosisView:
     report: str = ""
     """Path of the report.html beside it; empty where there is none."""
     notes: tuple[str, ...] = ()
-    """Such as how errors were measured, and what was re-tuned."""
+    """Remarks, such as how errors were measured and what was re-tuned."""
     candidates: tuple[str, ...] = ()
     """What was not confirmed, the best first; without one that the verdict says."""

@@ -42,7 +42,7 @@ class FormEntry:
 
     @property
     def field(self) -> FormField | None:
-        """None on Continue."""
+        """The field that has the cursor; None on Continue."""
         return self.form.fields[self.at] if self.at < len(self.form.fields) else None
 
 

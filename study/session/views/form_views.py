@@ -21,7 +21,7 @@ class FormKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Of a number."""
+    """Limits of a number."""
 
     lowest: float
     highest: float
@@ -56,7 +56,7 @@ class Form:
 @dataclass(frozen=True, slots=True)
 class FormReply:
     answers: dict[str, str]
-    """By the fields' keys."""
+    """Answers by the keys of their fields."""
 
 
 def find_missing_fields(form: Form, reply: FormReply) -> tuple[FormField, ...]:
@@ -77,7 +77,7 @@ def has_answer(field: FormField, answer: str) -> bool:
 
 
 def number_in(answer: str) -> float | None:
-    """A decimal number, with point or comma; None if it is none."""
+    """Parse a decimal number, with point or comma; None for other text."""
     plain = answer.replace(",", ".")
     return float(plain) if re.fullmatch(r"[+-]?([0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15})", plain) else None
 

@@ -77,11 +77,11 @@ def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOut
 def confirmation_of(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS) -> Form:
     """Confirmation form before a refused consent or an exclusion becomes final."""
     consent, answers = form.kind is FormKind.CONSENT, coded(form, reply)
-    told = [f"“{field.label}”" for field in form.fields if answers[field.key] != ("yes" if consent else "no")]
+    texts = [f"“{field.label}”" for field in form.fields if answers[field.key] != ("yes" if consent else "no")]
     return Form(
         form.kind,
         words["confirm_title"],
-        words.fill("confirm_no" if consent else "confirm_yes", {"questions": " ".join(told)}),
+        words.fill("confirm_no" if consent else "confirm_yes", {"questions": " ".join(texts)}),
         (_yes_no("right", words["confirm_refused" if consent else "confirm_excluded"], words),),
         form.version,
         form.ethics_id,
@@ -170,12 +170,12 @@ def _reminder(setup: SetupSettings, answers: dict[str, str]) -> str:
         (setup.hand_hidden and answers.get("hand_hidden") == "no", "the hand can be seen"),
         (setup.arm_supported and answers.get("arm_supported") == "no", "the arm is not supported"),
     )
-    told = ", ".join(what for differs, what in differing if differs)
-    return f"The set-up is not the protocol's: {told}." if told else ""
+    text = ", ".join(what for differs, what in differing if differs)
+    return f"The set-up is not the protocol's: {text}." if text else ""
 
 
 def _questions(kind: FormKind, name: str, questions: tuple[Question, ...], words: Words) -> Form:
-    """None of them needs an answer: taking part does not depend on them."""
+    """Form of voluntary questions: taking part does not depend on their answers."""
     fields = tuple(_question(question, words) for question in questions)
     return Form(kind, words[f"{name}_title"], words[f"{name}_intro"], fields)
 

@@ -10,7 +10,7 @@ BeforeMoving = Callable[[str], None]
 
 
 def refuse_unannounced(notice: str) -> None:
-    """Of a caller that tells no person: a real device does not move for it. Raises StudyError."""
+    """Refuse to move a real device, for a caller that cannot announce it to a person. Raises StudyError."""
     raise StudyError(
         "The device was not moved",
         f"A real device would move without a warning. {notice}",
@@ -32,7 +32,7 @@ def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> s
 
 
 def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
-    """For a device that moves the handle by itself."""
+    """Notice before a device moves the handle by itself."""
     return (
         f"No person may hold the handle: '{device}' is going to move by itself {_duration_words(total_s)}, pushed with "
         f"up to {peak_n:g} N and held at its place by a weak spring. Keep hands away and the workspace free; Ctrl-C "
@@ -41,7 +41,8 @@ def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
 
 
 def proof_notice(device: str, force_n: float) -> str:
-    """For the proof that a device's cap holds and that it lets go: without a spring, so the handle moves freely."""
+    """Notice before the proof that a device's cap holds and that it lets go: without a spring, so the handle moves
+    freely."""
     return (
         f"No person may hold the handle: within some seconds '{device}' is shaken along x for a quarter of a second, "
         f"by {force_n:g} N, or twice as much where its cap does not hold; then it is pushed along x with {force_n:g} N "

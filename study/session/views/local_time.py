@@ -40,7 +40,7 @@ def local_parts(utc: str, zone: Zone, to: Detail = "seconds") -> tuple[str, str,
 
 
 def local_column(utcs: Sequence[str], zone: Zone) -> tuple[str, tuple[str, ...]]:
-    """Times below each other: their most frequent offset for the header, and each time, with its offset where that
+    """Times as a column: their most frequent offset for the header, and each time, with its own offset where that
     differs, such as in the other half of the year."""
     parts = [local_parts(utc, zone, "minutes") for utc in utcs]
     offsets = Counter(offset for _, _, offset in parts if offset)

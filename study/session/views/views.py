@@ -30,7 +30,7 @@ class DirectionPicture:
 
     plane: str
     angle_deg: tuple[float, float]
-    """Of number 1 and number 2, as this participant sees them."""
+    """Angles of directions 1 and 2, as this participant sees them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class Question:
     """A short practice, with a criterion to pass."""
     progress: Progress | None = None
     repeats_left: int | None = None
-    """The participant may still ask so often for a trial of this run again. None: no limit (first rules)."""
+    """How often the participant may still ask for a trial of this run again. None: no limit (first rules)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class PlayingNotice:
     """A stimulus (or its absence) of a fixed length, to which nothing is answered yet."""
 
     title: str
-    """Such as "Direction 1" or "Interval 2"."""
+    """Title of the interval or direction, such as "Direction 1" or "Interval 2"."""
     number: int
     """1 or 2: what is highlighted."""
     seconds: float
@@ -132,7 +132,7 @@ class DeviceFinding:
     advice: str = ""
     """What to do where it is not fine."""
     warning: bool = False
-    """It is not fine, and hinders nothing that this device is used for."""
+    """Not fine, but no obstacle to anything that this device is used for."""
 
     @property
     def wrong(self) -> bool:
@@ -165,7 +165,7 @@ class HandleView:
 
     ready: bool
     sentence: str
-    """Such as "Bring the handle 12 mm back to the centre"."""
+    """Instruction, such as "Bring the handle 12 mm back to the centre"."""
     offset_mm: tuple[float, float]
     """From the centre, right and up in the plane of the picture."""
     radius_mm: float
@@ -178,7 +178,7 @@ class PracticeResult:
     passed: bool
     right: int
     of: int
-    """Right answers among the last so many."""
+    """Number of last answers of which the right ones are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +211,7 @@ class Goodbye:
     reason: str = ""
     """Why the sitting ended before the session was finished."""
     outcome: Literal["", "refused", "excluded"] = ""
-    """Of a person who does not take part: there is nothing to go on with."""
+    """Why a person does not take part: then there is no session to continue."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ class Live:
     fault: str
     """The device's fault in words; empty where there is none."""
     offset_mm: float | None
-    """Of the handle from its place, now."""
+    """Present distance of the handle from its place."""
     handle_ready: bool
     """Within the gate's radius; true where there is no gate."""
     acceleration_mps2: float | None

@@ -68,8 +68,8 @@ class Situation:
 def alarms_of(now: Situation, before: tuple[Alarm, ...]) -> tuple[Alarm, ...]:
     """Current alarms, most urgent first. A lasting alarm keeps its start time."""
     known = {alarm.kind: alarm for alarm in before}
-    looks = _RUNNING if now.standing in ON else _OVER
-    found = [alarm for look in looks if (alarm := look(now)) is not None]
+    checks = _RUNNING if now.standing in ON else _OVER
+    found = [alarm for look in checks if (alarm := look(now)) is not None]
     lasting = [
         alarm if alarm.event or alarm.kind not in known else replace(alarm, since=known[alarm.kind].since)
         for alarm in found

@@ -10,7 +10,7 @@ from typing import Literal
 from study.session.watching.live import Live
 
 Standing = Literal["running", "paused", "resting", "not running", "finished", "stopped", "refused", "excluded"]
-"""`stopped`: the sitting was ended; `not running`: the program is gone without a word. Both can be resumed."""
+"""`stopped`: the sitting was ended; `not running`: the program ended without writing so. Both can be resumed."""
 
 ON: tuple[Standing, ...] = ("running", "paused", "resting")
 
@@ -33,7 +33,7 @@ class WatchedRun:
 
 @dataclass(frozen=True, slots=True)
 class StaircasePoint:
-    """A counted trial that steers the run; catch trials are none."""
+    """A counted trial that steers the run; catch trials do not steer it."""
 
     trial: int
     level_n: float
@@ -126,7 +126,7 @@ class DriftLine:
     """Since the session was opened, when it was first seen."""
     sentence: str
     beyond: bool
-    """It leaves what the analysis of the session allows."""
+    """Whether the drift exceeds what the analysis of the session allows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ class WatchView:
     session: str
     subject: str
     protocol: str
-    """Its title."""
+    """Title of the protocol."""
     device: str
     simulated: bool
     """Nothing moves."""
@@ -167,7 +167,7 @@ class WatchView:
     """The run that `points` belong to: the present one, or the last one while nothing is answered in it."""
     points: tuple[StaircasePoint, ...]
     next_level_n: float | None
-    """Of the staircase in `shown_run`, after the last point; None where the run is over."""
+    """Next level of the staircase in `shown_run`, after the last point; None where the run is over."""
     cap_n: float
     open_trial: OpenTrial | None
     last: tuple[ClosedTrial, ...]
@@ -183,7 +183,7 @@ class WatchView:
     gate_radius_mm: float
     """0 where there is no gate."""
     live: Live | None
-    """None where nothing was told for some seconds."""
+    """Live values; None where nothing was received for some seconds."""
     alarms: tuple[Alarm, ...]
     probes: int = 0
     """Kept so far, references included."""

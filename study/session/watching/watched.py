@@ -53,7 +53,7 @@ class Watched:
     notes_before: int
     """How many of `notes` are older than the present sitting."""
     last_utc: str
-    """Of the last fact."""
+    """Time of the last fact."""
     sitting: int = 0
     playing: PlayedProbe | None = None
     probes: tuple[PlayedProbe, ...] = ()

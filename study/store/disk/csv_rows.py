@@ -11,6 +11,8 @@ from enum import Enum
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from equalizer.signals.listed_problems import ListedProblemsError
+
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
@@ -20,12 +22,8 @@ _SHOWN = 8
 """Largest number of problems that are listed individually."""
 
 
-class CsvError(ValueError):
+class CsvError(ListedProblemsError):
     """A table that cannot be used. `problems`: one sentence each, with line and column."""
-
-    def __init__(self, problems: tuple[str, ...]) -> None:
-        super().__init__("; ".join(problems))
-        self.problems = problems
 
 
 def columns(row_type: type[Any]) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ def datasets_in(file: Any) -> Iterator[tuple[str, Any]]:
 
     h5py's own visitors do not report external links, and fail on damaged ones.
     """
-    seen: set[int] = set()
+    visited: set[int] = set()
     waiting = [("", file)]
     while waiting:
         path, group = waiting.pop()
@@ -39,10 +39,10 @@ def datasets_in(file: Any) -> Iterator[tuple[str, Any]]:
             if isinstance(link, h5py.ExternalLink):
                 raise ValueError(f"{name} is a link to another file ({link.filename}); copy the data into this one")
             entry = group[key] if isinstance(link, h5py.HardLink) else None
-            if entry is None or (address := h5py.h5o.get_info(entry.id).addr) in seen:
+            if entry is None or (address := h5py.h5o.get_info(entry.id).addr) in visited:
                 continue
-            seen.add(address)
-            if len(seen) > MOST_OBJECTS:
+            visited.add(address)
+            if len(visited) > MOST_OBJECTS:
                 raise ValueError(f"it holds more than {MOST_OBJECTS} objects")
             if isinstance(entry, h5py.Dataset):
                 yield name, entry

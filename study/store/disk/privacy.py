@@ -84,8 +84,8 @@ def privacy_warning(folder: Path, why: str = "") -> str:
     if not open_to_others(folder):
         return ""
     mode = stat.S_IMODE(folder.stat().st_mode)
-    said = f"Other accounts of this computer have rights to {folder} (mode {mode:03o})."
-    return f"{said}{why and f' A session leaves them: {why}.'} Take them away: chmod 700 {folder}"
+    text = f"Other accounts of this computer have rights to {folder} (mode {mode:03o})."
+    return f"{text}{why and f' A session leaves them: {why}.'} Take them away: chmod 700 {folder}"
 
 
 def data_folder_warning(data: Path) -> str:

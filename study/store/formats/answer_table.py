@@ -13,7 +13,7 @@ ASKED = {"before": "questionnaire", "debrief": "debrief"}
 
 @dataclass(frozen=True, slots=True)
 class FilledForm:
-    """As it was logged."""
+    """A filled form, as it was logged."""
 
     subject: str
     session: str
@@ -24,7 +24,7 @@ class FilledForm:
 @dataclass(frozen=True, slots=True)
 class AnswerColumn:
     table: str
-    """Of the protocol: before or debrief."""
+    """The protocol's table of questions: before or debrief."""
     question: Question
 
     @property
@@ -34,7 +34,7 @@ class AnswerColumn:
     @property
     def description(self) -> str:
         """The question, and what its answers mean, in one line."""
-        question, meaning = self.question, "; ".join(f"{code}: {said}" for code, said in self.levels.items())
+        question, meaning = self.question, "; ".join(f"{code}: {level}" for code, level in self.levels.items())
         return f"{' '.join(question.question.split())}{f' ({meaning})' if meaning else ''}"
 
     @property
@@ -43,8 +43,8 @@ class AnswerColumn:
         question = self.question
         if question.ends:
             return {question.steps[0]: question.ends[0], question.steps[-1]: question.ends[1]}
-        said = dict(zip(question.codes, question.choices, strict=False))
-        return {code: choice for code, choice in said.items() if code != choice}
+        by_code = dict(zip(question.codes, question.choices, strict=False))
+        return {code: choice for code, choice in by_code.items() if code != choice}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +72,12 @@ def answer_table(protocol: StudyProtocol, filled: Sequence[FilledForm], free_tex
         for question in questions
         if free_text or not question.is_free_text
     )
-    said = {(form.subject, form.session, form.form, key): answer
+    by_question = {(form.subject, form.session, form.form, key): answer
             for form in filled for key, answer in form.answers.items()}  # fmt: skip
     sessions = dict.fromkeys((form.subject, form.session) for form in filled if form.form in ASKED.values())
     rows = tuple(
         (subject, session, tuple(
-            said.get((subject, session, ASKED[column.table], column.question.key), "") for column in columns
+            by_question.get((subject, session, ASKED[column.table], column.question.key), "") for column in columns
         ))
         for subject, session in sessions
     )  # fmt: skip

@@ -91,19 +91,21 @@ def _participants(folder: Path, subjects: Sequence[str], answers: AnswerTable) -
         for place, column in enumerate(answers.columns)
         if column.table == "before" and column.question.key in PARTICIPANT_COLUMNS
     ]
-    said = {
+    by_question = {
         column.question.key: [
             next((row[2][place] for row in answers.rows if row[0] == subject and row[2][place]), "n/a")
             for subject in subjects
         ]
         for place, column in known
     }
-    said = {key: values for key, values in said.items() if all(_fits(key, value) for value in values)}
-    lines = [["participant_id", "code", *said]]
-    lines += [[f"sub-{_label(subject)}", subject, *(values[number] for values in said.values())]
+    by_question = {key: values for key, values in by_question.items() if all(_fits(key, value) for value in values)}
+    lines = [["participant_id", "code", *by_question]]
+    lines += [[f"sub-{_label(subject)}", subject, *(values[number] for values in by_question.values())]
               for number, subject in enumerate(subjects)]  # fmt: skip
     text = "".join("\t".join(line) + "\n" for line in lines)
-    described = {column.question.key: _describe_answers(column) for _, column in known if column.question.key in said}
+    described = {
+        column.question.key: _describe_answers(column) for _, column in known if column.question.key in by_question
+    }
     return [
         _text(folder / "participants.tsv", text),
         _json(folder / "participants.json", {"code": {"Description": "Code as recorded"}, **described}),
@@ -121,8 +123,8 @@ def _phenotype(folder: Path, table: str, answers: AnswerTable) -> list[Path]:
     """Answers to the questions of one table of the protocol, a row per session."""
     columns_of = [(place, column) for place, column in enumerate(answers.columns) if column.table == table]
     lines = [["participant_id", "session_id", *(column.question.key for _, column in columns_of)]]
-    lines += [[f"sub-{_label(subject)}", f"ses-{_label(session)}", *(_cell(said[place]) for place, _ in columns_of)]
-              for subject, session, said in answers.rows]  # fmt: skip
+    lines += [[f"sub-{_label(subject)}", f"ses-{_label(session)}", *(_cell(row[place]) for place, _ in columns_of)]
+              for subject, session, row in answers.rows]  # fmt: skip
     described = {column.question.key: _describe_answers(column) for _, column in columns_of}
     text = "".join("\t".join(line) + "\n" for line in lines)
     place = folder / "phenotype"

@@ -95,7 +95,7 @@ def read_protocol(name: str, data: Path | None = None) -> ProtocolFile[Protocol]
 
 
 def read_study_protocol(name: str, data: Path | None = None) -> ProtocolFile[StudyProtocol]:
-    """As `read_protocol`; raises WrongUseError for a recording protocol."""
+    """Read a study protocol. Raises as `read_protocol`, and WrongUseError for a recording protocol."""
     found = read_protocol(name, data)
     if not isinstance(found.protocol, StudyProtocol):
         raise _other_kind(found.protocol, "a participant can take", "hapteq record")
@@ -103,7 +103,7 @@ def read_study_protocol(name: str, data: Path | None = None) -> ProtocolFile[Stu
 
 
 def read_recording_protocol(name: str, data: Path | None = None) -> ProtocolFile[RecordingProtocol]:
-    """As `read_protocol`; raises WrongUseError for a study protocol."""
+    """Read a recording protocol. Raises as `read_protocol`, and WrongUseError for a study protocol."""
     found = read_protocol(name, data)
     if not isinstance(found.protocol, RecordingProtocol):
         raise _other_kind(found.protocol, "a device can record", "hapteq study")

@@ -53,7 +53,7 @@ def _answers(table: AnswerTable) -> dict[str, Any]:
     """A structure of cells, a row per session; nothing where no question is asked."""
     if not table.columns:
         return {}
-    rows = [(subject, session, *said) for subject, session, said in table.rows]
+    rows = [(subject, session, *answers) for subject, session, answers in table.rows]
     described = {column.name[:LONGEST_FIELD]: column.description for column in table.columns}
     names = [name[:LONGEST_FIELD] for name in table.header]
     return {"answers": dict(zip(names, map(_cells, zip(*rows, strict=True)), strict=False)), "questions": described}

@@ -55,7 +55,7 @@ def withdrawal_file(data: Path, subject: str) -> Path:
 
 
 class SessionWithdrawnError(StudyError):
-    """The session was withdrawn and is no data any more, even if not all of it is erased yet."""
+    """The session was withdrawn: its data must not be used, even if not all of them are erased yet."""
 
     def __init__(self, folder: SessionFolder) -> None:
         super().__init__(

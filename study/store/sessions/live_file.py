@@ -22,10 +22,8 @@ _LARGEST_BYTES = 1 << 16
 
 
 def write_live(folder: Path, live: Live) -> None:
-    """At most about four times a second. Never raises: a session must not end because it cannot be watched.
-
-    One writer: the holder of the session's lock.
-    """
+    """Write the live values, at most about four times a second. Never raises: a session must not end because it cannot
+    be watched. One writer: the holder of the session's lock."""
     values = {name: _finite(value) for name, value in asdict(live).items()}
     text = json.dumps({"format": LIVE_FORMAT, "version": LIVE_VERSION, **values}, allow_nan=False)
     part = folder / f".{LIVE_NAME}.part"

@@ -49,10 +49,8 @@ def seal_paths(folder: Path) -> dict[int, Path]:
 
 
 def write_seal(folder: Path, contents: LogContents) -> bool:
-    """On return the seal is on the disk. False if a seal covers the whole log already.
-
-    contents: of a closed session whose log has checksums. Raises StudyError.
-    """
+    """Write the seal; on return it is on the disk. False if a seal covers the whole log already. contents: of a closed
+    session whose log has checksums. Raises StudyError."""
     if check_seals(folder, contents) == contents.chain.lines:
         return False
     seal = Seal(

@@ -6,10 +6,8 @@ from study.regular_file import open_regular
 
 
 def is_log_locked(log: Path) -> bool | None:
-    """None if unknown (no such locks here, no such log).
-
-    Probing holds the lock for some microseconds, in which a writer would be refused: probe rarely.
-    """
+    """Whether a process holds the log's lock; None if unknown (no such locks here, no such log). Probing holds the lock
+    for some microseconds, in which a writer would be refused: probe rarely."""
     try:
         import fcntl
     except ImportError:  # Windows

@@ -77,7 +77,7 @@ class RequestInbox:
         return True
 
     def clear(self) -> None:
-        """At the start of a sitting: remove old stop and pause requests. Notes are kept for the log. Never raises."""
+        """Remove old stop and pause requests, at the start of a sitting. Notes are kept for the log. Never raises."""
         try:
             self._make_folder()
             names = os.listdir(self._folder)  # noqa: PTH208

@@ -11,7 +11,7 @@ from study.store.formats.recording_file import read_recording, write_recording
 from study.store.sessions.archive import SessionFolder
 
 PROBE_PREFIX = "probe-"
-"""Of files that hold a probe, and no trial."""
+"""File name prefix of recordings of a probe instead of a trial."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,8 @@ def probe_name(number: int) -> str:
 def save_trial_recording(
     folder: SessionFolder, name: str, recording: Recording, conditions: Mapping[str, Any]
 ) -> SavedRecording:
-    """On return it is on the disk. conditions: JSON values about what was played and the device's state.
+    """Save a trial's recording; on return it is on the disk. conditions: JSON values about what was played and the
+    device's state.
 
     Nothing is overwritten: if a disk lost the end of a log but not its recordings, the name gets a number.
     """

@@ -21,7 +21,7 @@ from study.tui import home_messages
 from study.tui.app import outcomes
 from study.tui.app.app_start import AppStart
 from study.tui.app.archive_screens import ArchiveScreens, ArchiveWanted, command_for
-from study.tui.app.engine_line import EngineLine, EngineSaid
+from study.tui.app.engine_line import EngineLine, EngineMessage
 from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
 from study.tui.departure import leave_with_the_terminal
@@ -103,21 +103,21 @@ class HapteqApp(App[None]):
         await self._sitting.prepare()
         self._engine.send(first)
 
-    async def on_engine_said(self, event: EngineSaid) -> None:
-        said = event.said
-        match said:
+    async def on_engine_message(self, event: EngineMessage) -> None:
+        message = event.message
+        match message:
             case Finished():
-                self._end_sitting(outcomes.completion_outcome(said), said)
+                self._end_sitting(outcomes.completion_outcome(message), message)
             case Failed() if self._sitting is None:
                 self._archive.end_diagnosing()
                 self._archive.end_calibrating()
-                self._panel(outcomes.failure_outcome(said, at_home=True), said.path)
+                self._panel(outcomes.failure_outcome(message, at_home=True), message.path)
             case Failed():
-                self._end_sitting(outcomes.failure_outcome(said, at_home=False), said)
+                self._end_sitting(outcomes.failure_outcome(message, at_home=False), message)
             case _ if self._sitting is not None:
-                await self._sitting.hear(said)
+                await self._sitting.hear(message)
             case _:
-                await self._archive.hear(said)
+                await self._archive.hear(message)
 
     def _end_sitting(self, outcome: Outcome, end: Finished | Failed) -> None:
         opened = self._sitting is not None and self._sitting.path

@@ -49,15 +49,15 @@ TITLES = {
 
 def commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
     """Actions available on this screen now."""
-    told = set()
+    listed = set()
     for active in screen.active_bindings.values():
         binding = active.binding
         action = binding.action.removeprefix("app.").removeprefix("screen.")
         title = TITLES.get(action, binding.tooltip or binding.description)
         hidden = not binding.show and action not in TITLES
-        if hidden or not title or not active.enabled or action in told:
+        if hidden or not title or not active.enabled or action in listed:
             continue
-        told.add(action)
+        listed.add(action)
         key = app.get_key_display(binding)
         twin = TWINS.get(action)
         run = partial(app.run_action, binding.action, active.node)

@@ -14,10 +14,10 @@ from study.tui.engine.to_engine import Begin, Heartbeat, Resume, ToEngine
 HEARTBEAT_S = 0.1
 
 
-class EngineSaid(Message):
-    def __init__(self, said: FromEngine) -> None:
+class EngineMessage(Message):
+    def __init__(self, message: FromEngine) -> None:
         super().__init__()
-        self.said = said
+        self.message = message
 
 
 class EngineLine:
@@ -57,4 +57,4 @@ class EngineLine:
     def _deliver(self, message: FromEngine) -> None:
         if isinstance(message, Finished | Failed):
             self.last_end = message
-        self._app.post_message(EngineSaid(message))
+        self._app.post_message(EngineMessage(message))

@@ -30,8 +30,8 @@ def failure_outcome(failure: Failed, at_home: bool) -> Outcome:
     error = failure.error
     parts = (("What happened", error.happened), ("What is safe", error.saved), ("What to do now", error.do_now))
     way_on: tuple[Decision, ...] = ("back",) if at_home else ("home", "quit")
-    told = tuple((heading, text) for heading, text in parts if text)
-    return Outcome(error.title, told, ("resume", *way_on) if failure.path else way_on)
+    paragraphs = tuple((heading, text) for heading, text in parts if text)
+    return Outcome(error.title, paragraphs, ("resume", *way_on) if failure.path else way_on)
 
 
 def completion_outcome(end: Finished) -> Outcome:
@@ -42,6 +42,6 @@ def completion_outcome(end: Finished) -> Outcome:
         ("To know", "\n".join(f"• {warning}" for warning in results.warnings)),
         ("Report", results.report),
     )
-    told = tuple((heading, text) for heading, text in parts if text)
+    paragraphs = tuple((heading, text) for heading, text in parts if text)
     title = f"The session is finished: {end.answers} answers"
-    return Outcome(title, told, ("look", "home", "quit"), grave=False)
+    return Outcome(title, paragraphs, ("look", "home", "quit"), grave=False)

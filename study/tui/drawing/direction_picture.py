@@ -24,7 +24,7 @@ def sentence(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORD
 
 
 def ends(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORDS) -> str:
-    """Such as "up-left to down-right"."""
+    """Both ends of a direction in words, such as "up-left to down-right"."""
     angle = picture.angle_deg[number - 1]
     start, end = _end(picture.plane, angle, words), _end(picture.plane, angle + 180, words)
     return words.fill("direction_ends", {"start": start, "end": end})

@@ -20,7 +20,7 @@ _FIRST = (RIGHT, WRONG, VALLEY, PEAK)
 
 
 def staircase_lines(staircase: Staircase, columns: int, rows: int) -> tuple[str, ...]:
-    """As many lines as `rows`, at most `columns` wide; the last one counts the trials."""
+    """Draw the staircase in as many lines as `rows`, at most `columns` wide; the last one counts the trials."""
     if columns < LABEL_COLUMNS + 8 or rows < 4:
         return ("No room to draw.",)
     if not staircase.levels_n:

@@ -11,10 +11,10 @@ from typing import IO
 
 
 def start_child(
-    module: str, function: str, *arguments: str, said: IO[bytes] | int = subprocess.DEVNULL
+    module: str, function: str, *arguments: str, output: IO[bytes] | int = subprocess.DEVNULL
 ) -> tuple[Connection, "subprocess.Popen[bytes]"]:
     """Run `function(descriptor of its end of the pipe, *arguments)` in a new process. It is named by text because its
-    module is not loaded here. What it prints goes to `said`.
+    module is not loaded here. What it prints goes to `output`.
 
     The process has a session of its own: the terminal's Ctrl-C and Ctrl-Z do not reach it, and it cannot write on the
     screen. It uses this process's import path. It sees the end of the pipe when this process ends for any reason.
@@ -27,8 +27,8 @@ def start_child(
         process = subprocess.Popen(
             [sys.executable, "-c", program],
             stdin=subprocess.DEVNULL,
-            stdout=said,
-            stderr=said,
+            stdout=output,
+            stderr=output,
             pass_fds=(theirs.fileno(),),
             start_new_session=True,
         )

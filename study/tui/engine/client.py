@@ -67,9 +67,9 @@ class EngineClient:
             process.wait()
 
     def _live(self) -> None:
-        with tempfile.TemporaryFile() as said:
+        with tempfile.TemporaryFile() as output:
             try:
-                connection, process = start_child("study.tui.engine.engine", "run", said=said)
+                connection, process = start_child("study.tui.engine.engine", "run", output=output)
             except OSError as problem:
                 self.dead = True
                 self._deliver(_not_started(problem))
@@ -84,7 +84,7 @@ class EngineClient:
             connection.close()
             if not self._closing:
                 self.dead = True
-                self._deliver(_death(code, _last_words(said), self._opened))
+                self._deliver(_death(code, _last_words(output), self._opened))
 
     def _read(self, connection: Connection) -> None:
         try:
@@ -122,9 +122,9 @@ def _not_started(problem: OSError) -> Failed:
     return Failed(ErrorText("The device program cannot be started", happened, "", do_now, int(ExitCode.ERROR)))
 
 
-def _last_words(said: IO[bytes]) -> str:
-    said.seek(0)
-    lines = said.read().decode(errors="replace").strip().splitlines()
+def _last_words(output: IO[bytes]) -> str:
+    output.seek(0)
+    lines = output.read().decode(errors="replace").strip().splitlines()
     return lines[-1].strip() if lines else ""
 
 

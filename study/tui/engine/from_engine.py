@@ -115,7 +115,7 @@ class Calibrated:
     """All six positions are known."""
 
     table: str
-    """Of the lab's file, TOML."""
+    """Table of the lab's file, TOML."""
     file: str
 
 

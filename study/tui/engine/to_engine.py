@@ -78,7 +78,7 @@ class Diagnose:
     out: str
     """Empty: a new folder near what is diagnosed."""
     clean: tuple[str, ...] = ()
-    """Of the device when it was in order."""
+    """Recordings of the device when it was in order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +123,7 @@ class Heartbeat:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """To the `Ask` or `LayDown` of the same number. A number that is over is ignored."""
+    """Reply to the `Ask` or `LayDown` of the same number. Replies to a question that is over are ignored."""
 
     number: int
     value: Any

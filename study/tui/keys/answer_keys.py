@@ -32,7 +32,7 @@ DIGITS = AnswerKeys()
 
 
 def parse_keys(text: str) -> AnswerKeys:
-    """From "f,j": the key for 1, then the key for 2. Raises WrongUseError."""
+    """Parse two keys such as "f,j": the key for 1, then the key for 2. Raises WrongUseError."""
     keys = [part.strip().casefold() for part in text.split(",")]
     if len(keys) != 2:
         raise _refusal(f"'{text}' names {len(keys)} of them")

@@ -12,7 +12,7 @@ FIRST_REPEAT_S = 0.7
 
 
 class KeyPresses:
-    """For the answer keys; several keys of one answer count as one."""
+    """Presses of the answer keys; several keys of one answer count as one."""
 
     def __init__(self) -> None:
         self._last_s: dict[int, float] = {}

@@ -75,7 +75,7 @@ class KeysInOrder:
         self._app.call_later(self._next)
 
     def _with_the_keyboard(self) -> list[MessagePump]:
-        """From the widget that has the keyboard up to the application."""
+        """The chain of widgets from the one that has the keyboard up to the application."""
         if not self._app.screen_stack:
             return [self._app]
         return list((self._app.focused or self._app.screen).ancestors_with_self)

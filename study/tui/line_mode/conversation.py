@@ -88,7 +88,7 @@ class Conversation:
         return reply
 
     def answer_or_leave(self) -> Line:
-        """As `answer`; q leaves."""
+        """Read an answer; the line "q" leaves."""
         line = self.answer()
         if line.word == "q":
             raise KeyboardInterrupt

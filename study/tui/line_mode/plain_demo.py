@@ -33,8 +33,8 @@ def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_li
         if line.word in ("", "done"):
             return DemoDone()
         if line.word in ("n", "b"):
-            vibration, said = _step_vibration(menu, vibration, 1 if line.word == "n" else -1, talk.words)
-            talk.say(said)
+            vibration, sentence = _step_vibration(menu, vibration, 1 if line.word == "n" else -1, talk.words)
+            talk.say(sentence)
             continue
         number = keys.answer(line.text)
         if number is not None:
@@ -58,12 +58,12 @@ def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOf
 
 def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
     talk.forget()
-    said, said_at_s = "", float("-inf")
+    last_sentence, said_at_s = "", float("-inf")
     while not (view := look()).ready:
         now_s = talk.clock.now_s()
-        if view.sentence != said and now_s - said_at_s >= SAY_AGAIN_S:
+        if view.sentence != last_sentence and now_s - said_at_s >= SAY_AGAIN_S:
             talk.say(talk.words.fact(view.sentence))
-            said, said_at_s = view.sentence, now_s
+            last_sentence, said_at_s = view.sentence, now_s
         cut = INPUT_ENDED if talk.input_is_over() else _glance(talk, sign_of_life, GLANCE_S)
         if cut is not None:
             return cut

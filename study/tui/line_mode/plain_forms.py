@@ -35,9 +35,9 @@ def fill_in(form: Form, talk: Conversation) -> FormReply:
 def _confirm_changes(form: Form, answers: dict[str, str], talk: Conversation) -> bool:
     """Whether changed answers are confirmed; otherwise the form is asked again."""
     talk.forget()
-    told = ", ".join(f"{number} {answers[field.key]}" for number, field in enumerate(form.fields, start=1))
+    text = ", ".join(f"{number} {answers[field.key]}" for number, field in enumerate(form.fields, start=1))
     words = talk.words
-    talk.say("", words.fill("line_form_changed", {"answers": told}))
+    talk.say("", words.fill("line_form_changed", {"answers": text}))
     while True:
         talk.prompt(words["line_form_confirm"])
         line = talk.answer_or_leave()
@@ -118,5 +118,5 @@ def _refusal(field: FormField, line: Line, numbered: bool, words: Words) -> str:
     answers = field.choices[0]
     for choice in field.choices[1:]:
         answers = words.fill("line_form_or", {"first": answers, "second": choice})
-    told = {"typed": typed, "answers": answers, "count": len(field.choices)}
-    return words.fill("line_form_none_numbered" if numbered else "line_form_none", told)
+    values = {"typed": typed, "answers": answers, "count": len(field.choices)}
+    return words.fill("line_form_none_numbered" if numbered else "line_form_none", values)

@@ -86,7 +86,7 @@ def _explanation(question: Question, words: Words) -> tuple[str, ...]:
 
 
 def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
-    """The reply of a typed line; None if it is none."""
+    """The reply of a typed line; None if the line is not a reply."""
     answer = keys.answer(line.text)
     if answer is not None:
         return Answered(answer, line.at_s)

@@ -11,9 +11,9 @@ from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import DirectoryTree, Footer, Input, Static
 
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.home_messages import DiagnosisWanted, SessionWanted
 from study.tui.screens.help import HelpScreen
-from study.tui.take_off import take_off
 
 LOG, DIAGNOSIS = "events.jsonl", "diagnosis.json"
 
@@ -28,7 +28,7 @@ In a terminal: `hapteq show PATH`.
 """
 
 
-class OurFiles(DirectoryTree):
+class HapteqFiles(DirectoryTree):
     """Folders, and the two kinds of file that can be opened."""
 
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
@@ -46,7 +46,7 @@ class BrowseScreen(ModalScreen[None]):
     BrowseScreen > Vertical {
         width: 90%; max-width: 100; height: 90%; border: round $primary; padding: 0 1; background: $surface;
     }
-    BrowseScreen OurFiles { height: 1fr; background: $surface; }
+    BrowseScreen HapteqFiles { height: 1fr; background: $surface; }
     BrowseScreen #said { height: 1; color: $foreground 65%; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -62,13 +62,13 @@ class BrowseScreen(ModalScreen[None]):
         with Vertical() as box:
             box.border_title = "Open a session or a diagnosis"
             yield Input(str(self._folder.absolute()), compact=True, id="path")
-            yield OurFiles(self._folder.absolute(), id="tree")
+            yield HapteqFiles(self._folder.absolute(), id="tree")
             yield Static("", id="said", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
         self._say(f"{LOG}: a session. {DIAGNOSIS}: a diagnosis.")
-        self.query_one(OurFiles).focus()
+        self.query_one(HapteqFiles).focus()
 
     @on(Input.Submitted, "#path")
     def _go(self, typed: Input.Submitted) -> None:
@@ -76,7 +76,7 @@ class BrowseScreen(ModalScreen[None]):
         if path.is_dir() and (path / LOG).exists():
             self._open(path / LOG)
         elif path.is_dir():
-            tree = self.query_one(OurFiles)
+            tree = self.query_one(HapteqFiles)
             tree.path = path
             tree.focus()
         elif path.is_file():
@@ -92,12 +92,12 @@ class BrowseScreen(ModalScreen[None]):
         self.app.push_screen(HelpScreen(HELP))
 
     def action_leave(self) -> None:
-        take_off(self, None)
+        dismiss_screen(self, None)
 
     def _open(self, path: Path) -> None:
         wanted = SessionWanted(str(path.parent)) if path.name == LOG else DiagnosisWanted(str(path))
         self.app.post_message(wanted)
-        take_off(self, None)
+        dismiss_screen(self, None)
 
     def _say(self, text: str) -> None:
         self.query_one("#said", Static).update(text)

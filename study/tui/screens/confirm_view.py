@@ -11,8 +11,8 @@ from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Input
 
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
-from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
@@ -60,7 +60,7 @@ class ConfirmView(ModalScreen[bool]):
     @on(Input.Submitted)
     def _judge(self, typed: Input.Submitted) -> None:
         if typed.value.strip() == self._session:
-            take_off(self, True)
+            dismiss_screen(self, True)
         else:
             self.query_one("#said", LiteralText).update(f"That is not {self._session}. Nothing is opened.")
 
@@ -68,7 +68,7 @@ class ConfirmView(ModalScreen[bool]):
         self.app.push_screen(HelpScreen(self.HELP))
 
     def action_leave(self) -> None:
-        take_off(self, False)
+        dismiss_screen(self, False)
 
 
 def confirm_view(app: App[Any], session: str, go_on: Callable[[], object]) -> None:

@@ -8,9 +8,9 @@ from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Input
 
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
@@ -43,7 +43,7 @@ class ConfirmWithdrawal(SpokenScreen[bool], ModalScreen[bool]):
     def _judge(self, typed: Input.Submitted) -> None:
         word = self.words["withdraw_word"]
         if typed.value.strip().casefold() == word.casefold():
-            take_off(self, True)
+            dismiss_screen(self, True)
         else:
             self.query_one("#said", LiteralText).update(self.words.fill("withdraw_other", {"word": word}))
 
@@ -51,4 +51,4 @@ class ConfirmWithdrawal(SpokenScreen[bool], ModalScreen[bool]):
         self.app.push_screen(HelpScreen(self.HELP, self.words))
 
     def action_leave(self) -> None:
-        take_off(self, False)
+        dismiss_screen(self, False)

@@ -11,9 +11,9 @@ from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.trial_words import felt_so_far
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
@@ -65,10 +65,10 @@ class DemoScreen(SpokenScreen[DemoChoice]):
         answer = self._keys.answer(event.character or event.key)
         if answer is not None:
             event.stop()
-            take_off(self, PlayDemo(self._vibration, answer))
+            dismiss_screen(self, PlayDemo(self._vibration, answer))
 
     def action_heard(self, answer: int) -> None:
-        """For the footer only: the answers are handled in `on_key`."""
+        """Gives the footer its entry; the answers are handled in `on_key`."""
 
     def action_turn(self, step: int) -> None:
         turned = self._vibration + step
@@ -90,7 +90,7 @@ class DemoScreen(SpokenScreen[DemoChoice]):
             self._asked = True
             self._show(self.words.fill("demo_unfelt", {"unfelt": unfelt, "all": 2 * self._menu.vibrations}))
             return
-        take_off(self, DemoDone())
+        dismiss_screen(self, DemoDone())
 
     def _show(self, sentence: str) -> None:
         menu = self._menu

@@ -8,8 +8,8 @@ from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DeviceFinding, DeviceReport
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.literal_text import LiteralText
 
@@ -53,13 +53,13 @@ class DeviceCheckScreen(SpokenScreen[bool]):
         return {"go_on": usable, "go_on_anyway": not usable}.get(action, True)
 
     def action_go_on(self) -> None:
-        take_off(self, True)
+        dismiss_screen(self, True)
 
     def action_go_on_anyway(self) -> None:
-        take_off(self, True)
+        dismiss_screen(self, True)
 
     def action_check_again(self) -> None:
-        take_off(self, False)
+        dismiss_screen(self, False)
 
 
 def _conclusion(report: DeviceReport, words: Words) -> str:

@@ -11,9 +11,9 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Input, Label, Static
 
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.home_messages import DiagnoseWanted
 from study.tui.screens.help import HelpScreen
-from study.tui.take_off import take_off
 
 HELP = """\
 # Diagnose
@@ -98,13 +98,13 @@ class DiagnoseForm(ModalScreen[None]):
             self._say(f"There is no file {model}.", "model")
         elif self.is_active:
             self.app.post_message(DiagnoseWanted(sources, model, out, named["clean"]))
-            take_off(self, None)
+            dismiss_screen(self, None)
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(HELP))
 
     def action_leave(self) -> None:
-        take_off(self, None)
+        dismiss_screen(self, None)
 
     def _text_of(self, name: str) -> str:
         return self.query_one(f"#{name}", Input).value.strip()

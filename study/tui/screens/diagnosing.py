@@ -10,8 +10,8 @@ from textual.containers import Vertical
 from textual.screen import Screen
 from textual.widgets import Footer, ProgressBar, Static
 
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.preparing import TICK_S, elapsed_words
-from study.tui.take_off import take_off
 
 HELP = """\
 # Diagnosing
@@ -62,7 +62,7 @@ class DiagnosingScreen(Screen[bool]):
             self.query_one(ProgressBar).update(progress=share)
 
     def action_stop(self) -> None:
-        take_off(self, True)
+        dismiss_screen(self, True)
 
     def _tick(self) -> None:
         self.query_one("#elapsed", Static).update(elapsed_words(self._now_s() - self._began_s))

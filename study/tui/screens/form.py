@@ -23,8 +23,8 @@ from study.session.views.form_entry import (
     reply_of,
 )
 from study.session.views.form_views import Form, FormReply, find_missing_fields
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.trial_words import limits_words, origin
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.choice_row import ChoiceRow
@@ -170,7 +170,7 @@ class FormScreen(SpokenScreen[FormReply]):
             return False
         before, self._entry = self._entry, entry
         if entry.sent and not before.sent:
-            take_off(self, reply_of(entry))
+            dismiss_screen(self, reply_of(entry))
         elif entry != before:
             self._show(entry)
         return True

@@ -8,8 +8,8 @@ from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Goodbye
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.trial_words import refusal_words
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
@@ -44,7 +44,7 @@ class GoodbyeScreen(SpokenScreen[None]):
         yield Footer(show_command_palette=False)
 
     def action_close_page(self) -> None:
-        take_off(self, None)
+        dismiss_screen(self, None)
 
 
 def _stops(reason: str, words: Words) -> str:

@@ -8,8 +8,8 @@ from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import HandleView, Unanswered
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.handle_target import HandleTarget
 from study.tui.widgets.literal_text import LiteralText
@@ -50,7 +50,7 @@ class HandleScreen(SpokenScreen[Unanswered | None]):
             self.query_one("#sentence", LiteralText).update(self.words.fact(view.sentence))
 
     def action_pause(self) -> None:
-        take_off(self, PAUSE)
+        dismiss_screen(self, PAUSE)
 
     def action_leave(self) -> None:
-        take_off(self, LEAVING)
+        dismiss_screen(self, LEAVING)

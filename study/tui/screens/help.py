@@ -9,8 +9,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 
 
 class HelpScreen(SpokenScreen[None], ModalScreen[None]):
@@ -36,4 +36,4 @@ class HelpScreen(SpokenScreen[None], ModalScreen[None]):
         yield Footer()
 
     def action_leave(self) -> None:
-        take_off(self, None)
+        dismiss_screen(self, None)

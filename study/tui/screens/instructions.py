@@ -9,9 +9,9 @@ from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Welcome
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.trial_words import plan
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.direction_panel import DirectionPanel
@@ -51,4 +51,4 @@ class InstructionsScreen(SpokenScreen[None]):
         yield Footer(show_command_palette=False)
 
     def action_begin(self) -> None:
-        take_off(self, None)
+        dismiss_screen(self, None)

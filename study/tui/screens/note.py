@@ -10,9 +10,9 @@ from textual.widgets import Button, Footer, TextArea
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.watching.requests import NoteAsked, Who
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.literal_text import LiteralText
@@ -72,10 +72,10 @@ class NoteScreen(SpokenScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
         elif who is None:
             self._refuse(self.words["note_no_writer"])
         else:
-            take_off(self, NoteAsked(WRITERS[who], text, self.query_one("#adverse", ChoiceRow).chosen == 1))
+            dismiss_screen(self, NoteAsked(WRITERS[who], text, self.query_one("#adverse", ChoiceRow).chosen == 1))
 
     def action_leave(self) -> None:
-        take_off(self, None)
+        dismiss_screen(self, None)
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(self.HELP, self.words))

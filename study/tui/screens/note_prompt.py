@@ -9,7 +9,7 @@ from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import Input, Label
 
-from study.tui.take_off import take_off
+from study.tui.dismiss_screen import dismiss_screen
 
 MOST_CHARACTERS = 500
 
@@ -46,10 +46,10 @@ class NotePrompt(ModalScreen[str | None]):
             yield Label("Enter writes it into the log, Escape leaves, F8 stops the session.")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        take_off(self, event.value.strip() or None)
+        dismiss_screen(self, event.value.strip() or None)
 
     def action_stop(self) -> None:
         self._stop()
 
     def action_leave(self) -> None:
-        take_off(self, None)
+        dismiss_screen(self, None)

@@ -12,7 +12,7 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Static
 
-from study.tui.take_off import take_off
+from study.tui.dismiss_screen import dismiss_screen
 
 Decision = Literal["resume", "look", "home", "quit", "back"]
 
@@ -101,7 +101,7 @@ class OutcomeScreen(ModalScreen[Decision]):
                 return
 
     def action_decide(self, decision: Decision) -> None:
-        take_off(self, decision)
+        dismiss_screen(self, decision)
 
 
 def _told(outcome: Outcome) -> Content:

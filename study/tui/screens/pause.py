@@ -13,10 +13,10 @@ from textual.widgets.option_list import Option
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import AfterPause, PauseNotice
 from study.session.watching.requests import NoteAsked
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.note import NoteScreen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
@@ -73,7 +73,7 @@ class PauseScreen(SpokenScreen[AfterPause]):
         if choice is AfterPause.WITHDRAW:
             self.app.push_screen(ConfirmWithdrawal(self.words), self._withdraw)
         else:
-            take_off(self, choice)
+            dismiss_screen(self, choice)
 
     def action_choose(self) -> None:
         self.query_one(OptionList).action_select()
@@ -83,7 +83,7 @@ class PauseScreen(SpokenScreen[AfterPause]):
 
     def _withdraw(self, confirmed: bool | None) -> None:
         if confirmed:
-            take_off(self, AfterPause.WITHDRAW)
+            dismiss_screen(self, AfterPause.WITHDRAW)
         else:
             self.query_one("#said", LiteralText).update(self.words["nothing_erased"])
 

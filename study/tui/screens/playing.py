@@ -9,8 +9,8 @@ from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import PlayingNotice, Unanswered
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
@@ -52,7 +52,7 @@ class PlayingScreen(SpokenScreen[Unanswered | None]):
         yield Footer(show_command_palette=False)
 
     def action_pause(self) -> None:
-        take_off(self, PAUSE)
+        dismiss_screen(self, PAUSE)
 
     def action_leave(self) -> None:
-        take_off(self, LEAVING)
+        dismiss_screen(self, LEAVING)

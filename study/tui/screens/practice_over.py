@@ -8,8 +8,8 @@ from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import PracticeResult
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
@@ -33,4 +33,4 @@ class PracticeOverScreen(SpokenScreen[None]):
         yield Footer(show_command_palette=False)
 
     def action_go_on(self) -> None:
-        take_off(self, None)
+        dismiss_screen(self, None)

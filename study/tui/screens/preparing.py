@@ -50,7 +50,7 @@ class PreparingScreen(SpokenScreen[None]):
             self.query_one("#sentence", Static).update(sentence)
 
     def speak(self, words: Words) -> None:
-        """In this language from now on."""
+        """Show the texts in this language from now on."""
         self.words = words
         for box in self.query(Vertical):
             box.border_title = words["preparing_title"]

@@ -10,8 +10,8 @@ from textual.widgets import Digits, Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import RestNotice
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.spoken_screen import SpokenScreen
-from study.tui.take_off import take_off
 from study.tui.trial_words import progress_sentence
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
@@ -57,7 +57,7 @@ class RestScreen(SpokenScreen[float]):
 
     def action_go_on(self) -> None:
         if self._over():
-            take_off(self, self._seconds_rested())
+            dismiss_screen(self, self._seconds_rested())
 
     def _tick(self) -> None:
         left_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))

@@ -9,9 +9,9 @@ from textual.containers import Horizontal, Vertical
 from textual.screen import Screen
 from textual.widgets import Footer, Input, Label, Static
 
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.engine.from_engine import Calibrated, LayDown, SensorKept
 from study.tui.home_messages import CalibrateWanted, CalibrationStopped, KeepWanted, LaidDown
-from study.tui.take_off import take_off
 
 HELP = """\
 # The accelerometer in six positions
@@ -73,10 +73,10 @@ class SensorScreen(Screen[None]):
     def on_mount(self) -> None:
         self.query_one("#port", Input).focus()
 
-    def hear(self, said: LayDown | Calibrated | SensorKept) -> None:
-        match said:
+    def hear(self, message: LayDown | Calibrated | SensorKept) -> None:
+        match message:
             case LayDown(number=number, position=position, heard=heard):
-                self._waits_for = said
+                self._waits_for = message
                 if heard is not None:
                     self._note(f"✓ read {', '.join(f'{value:.0f}' for value in heard)}")
                 self._say(f"{number} of {STEPS}: lay the sensor down with {position}, let go of it, press Enter.")
@@ -126,7 +126,7 @@ class SensorScreen(Screen[None]):
     def action_leave(self) -> None:
         if self._under_way:
             self.post_message(CalibrationStopped())
-        take_off(self, None)
+        dismiss_screen(self, None)
 
     @on(Input.Changed)
     def _unsay(self) -> None:

@@ -163,13 +163,13 @@ class SessionScreen(Screen[None]):
 
 
 def file_url(path: str) -> str:
-    """For a browser on this machine."""
+    """URL of a file for a browser on this machine."""
     return Path(path).absolute().as_uri()
 
 
 def open_report(app: App[object], path: str) -> None:
-    """In a browser of this machine; where the screen itself is in a browser, in a tab beside it, to which the page is
-    sent: no browser goes from a page of a server to a file."""
+    """Open a page in a browser of this machine; where the screen itself is in a browser, in a tab beside it, to which
+    the page is sent: no browser goes from a page of a server to a file."""
     if app.is_web:
         try:
             app.deliver_binary(path, open_method="browser", mime_type="text/html")

@@ -160,7 +160,7 @@ class TrialScreen(SpokenScreen[None]):
             self._say(self.words["pause_comes"])
 
     def action_heard(self, answer: int) -> None:
-        """For the footer only: the answers are handled in `on_key`."""
+        """Gives the footer its entry; the answers are handled in `on_key`."""
 
     def _take(self, answer: int, at_s: float) -> None:
         armed_s = self._armed_s

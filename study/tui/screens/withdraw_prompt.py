@@ -9,8 +9,8 @@ from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Input, Static
 
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
-from study.tui.take_off import take_off
 
 HELP = """\
 # Withdrawal
@@ -62,7 +62,7 @@ class WithdrawPrompt(ModalScreen[bool]):
     @on(Input.Submitted)
     def _judge(self, typed: Input.Submitted) -> None:
         if typed.value.strip() == self._subject:
-            take_off(self, True)
+            dismiss_screen(self, True)
         else:
             self.query_one("#said", Static).update(f"That is not {self._subject}. Nothing was erased.")
 
@@ -70,4 +70,4 @@ class WithdrawPrompt(ModalScreen[bool]):
         self.app.push_screen(HelpScreen(HELP))
 
     def action_leave(self) -> None:
-        take_off(self, False)
+        dismiss_screen(self, False)

@@ -6,6 +6,7 @@ from study.tui.watch.watch_words import (
     SYMBOLS,
     catch_words,
     clock_time,
+    describe_activity,
     device_words,
     dose_words,
     drift_words,
@@ -17,7 +18,6 @@ from study.tui.watch.watch_words import (
     staircase_title,
     time_words,
     verdict,
-    what_goes_on,
 )
 
 BELL = "\a"
@@ -27,8 +27,8 @@ LABEL_CELLS = 11
 
 def changes(before: WatchView | None, now: WatchView) -> list[str]:
     """One line for each change, alarms first, each with a bell. Without a previous view: the current state."""
-    seen = {(alarm.kind, alarm.since) for alarm in before.alarms} if before is not None else set()
-    lines = [f"{BELL}ALARM {alarm.sentence}" for alarm in now.alarms if (alarm.kind, alarm.since) not in seen]
+    reported = {(alarm.kind, alarm.since) for alarm in before.alarms} if before is not None else set()
+    lines = [f"{BELL}ALARM {alarm.sentence}" for alarm in now.alarms if (alarm.kind, alarm.since) not in reported]
     if before is None:
         return [*lines, *status(now)]
     lines += [_trial_line(trial) for trial in _new_trials(before, now)]
@@ -39,14 +39,14 @@ def changes(before: WatchView | None, now: WatchView) -> list[str]:
     if now.shown_run != before.shown_run and now.shown_run is not None:
         lines.append(staircase_title(now))
     if now.standing != before.standing:
-        lines.append(f"{now.standing.upper()}: {what_goes_on(now)}")
+        lines.append(f"{now.standing.upper()}: {describe_activity(now)}")
     return lines
 
 
 def status(view: WatchView) -> list[str]:
     """The whole view, without what is in the log anyway."""
     lines = [
-        f"{SYMBOLS[view.standing]} {view.standing.upper()} {view.session}: {what_goes_on(view)}",
+        f"{SYMBOLS[view.standing]} {view.standing.upper()} {view.session}: {describe_activity(view)}",
         f"Protocol   {view.protocol}; {view.answers} answers",
         f"Staircase  {staircase_title(view)}",
         f"Time       {time_words(view.exposure)} of this sitting",
@@ -72,8 +72,8 @@ def status(view: WatchView) -> list[str]:
 
 def _new_trials(before: WatchView, now: WatchView) -> list[ClosedTrial]:
     """Oldest first. A trial that is being measured is reported afterwards."""
-    told = {(t.run, t.trial, t.attempt) for t in before.last if t.status != "measuring"}
-    fresh = [t for t in now.last if (t.run, t.trial, t.attempt) not in told and t.status != "measuring"]
+    reported = {(t.run, t.trial, t.attempt) for t in before.last if t.status != "measuring"}
+    fresh = [t for t in now.last if (t.run, t.trial, t.attempt) not in reported and t.status != "measuring"]
     newest = (before.last[0].run, before.last[0].trial, before.last[0].attempt) if before.last else (-1, 0, 0)
     return [t for t in fresh[::-1] if (t.run, t.trial, t.attempt) >= newest]
 

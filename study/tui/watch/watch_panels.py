@@ -11,6 +11,7 @@ from study.tui.watch.watch_words import (
     SYMBOLS,
     catch_words,
     clock_time,
+    describe_activity,
     device_words,
     dose_words,
     drift_words,
@@ -21,7 +22,6 @@ from study.tui.watch.watch_words import (
     sensor_words,
     time_words,
     verdict,
-    what_goes_on,
 )
 
 Piece = Content | str | tuple[str, str]
@@ -45,7 +45,7 @@ BAR_CELLS = 6
 def standing_line(view: WatchView) -> Content:
     standing = f"{SYMBOLS[view.standing]} {view.standing.upper()}"
     return Content.assemble(
-        (standing, _STANDING_STYLES[view.standing]), "  ", (view.session, "bold"), f"  {what_goes_on(view)}"
+        (standing, _STANDING_STYLES[view.standing]), "  ", (view.session, "bold"), f"  {describe_activity(view)}"
     )
 
 
@@ -59,7 +59,7 @@ def alarm_lines(unseen: Sequence[Alarm], seen: Sequence[Alarm]) -> Content:
 
 
 def runs_lines(view: WatchView, rows: int) -> Content:
-    """As many runs as there are rows, the current one among them."""
+    """Lines on as many runs as there are rows, the current run among them."""
     lines = [Content.styled("  run            Hz  rev.  n", MUTED)]
     lines += [_run_line(view, run) for run in _around_the_present(view.runs, rows - 1)]
     return Content("\n").join(lines)

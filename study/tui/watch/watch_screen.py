@@ -196,7 +196,7 @@ class WatchScreen(Screen[None]):
             self.app.bell()
         self._show_alarms()
         if now_s - self._said_s > SAID_FOR_S:
-            self._guide(GUIDE, said=False)
+            self._guide(GUIDE, reply=False)
 
     def _alarms_of_the_view(self) -> tuple[Alarm, ...]:
         """Alarms of the view, except for an end that was requested here."""
@@ -261,7 +261,7 @@ class WatchScreen(Screen[None]):
     def action_leave(self) -> None:
         self.post_message(self.Left())
 
-    def _send(self, request: Request, said: str) -> None:
+    def _send(self, request: Request, text: str) -> None:
         try:
             self._ask(request)
         except StudyError as error:
@@ -269,14 +269,14 @@ class WatchScreen(Screen[None]):
             self.app.bell()
             return
         if self.view is not None and self.view.standing not in ON:
-            said = "Nothing runs here; it was sent all the same."
-        self._say(said)
+            text = "Nothing runs here; it was sent all the same."
+        self._say(text)
 
     def _say(self, sentence: str) -> None:
         self._said_s = self._clock_s()
-        self._guide(sentence, said=True)
+        self._guide(sentence, reply=True)
 
-    def _guide(self, sentence: str, said: bool) -> None:
+    def _guide(self, sentence: str, reply: bool) -> None:
         guide = self.query_one("#guide", Static)
-        guide.set_class(said, "said")
+        guide.set_class(reply, "said")
         guide.update(sentence)

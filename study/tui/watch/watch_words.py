@@ -18,7 +18,7 @@ SYMBOLS: dict[Standing, str] = {
 
 NOT_MEASURED_MARK = "n.m."
 NOT_MEASURED = "answered too early to measure; counts"
-"""Fits beside the mark in a terminal of 80 columns."""
+"""Legend of the mark, short enough for a terminal of 80 columns."""
 
 
 def clock_time(utc: str) -> str:
@@ -28,7 +28,7 @@ def clock_time(utc: str) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Rounded down: "4 s", "2 min 05 s", "1 h 02 min"."""
+    """A time in words, rounded down: "4 s", "2 min 05 s", "1 h 02 min"."""
     whole = int(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -38,8 +38,8 @@ def duration(seconds: float) -> str:
     return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
-def what_goes_on(view: WatchView) -> str:
-    """Activity in words: "trial 12 of test run 2, 35 Hz: waiting for the answer, 4 s"."""
+def describe_activity(view: WatchView) -> str:
+    """What happens now, in words: "trial 12 of test run 2, 35 Hz: waiting for the answer, 4 s"."""
     if view.reason:
         return view.reason
     trial, run = view.open_trial, view.present_run
@@ -53,7 +53,7 @@ def what_goes_on(view: WatchView) -> str:
 
 
 def run_name(view: WatchView, run: WatchedRun) -> str:
-    """Numbered within its phase: "test 2"."""
+    """Name of a run, numbered within its phase: "test 2"."""
     return f"{run.phase} {1 + [r.run for r in view.runs if r.phase == run.phase].index(run.run)}"
 
 
@@ -71,7 +71,7 @@ def staircase_title(view: WatchView) -> str:
 
 
 def verdict(trial: ClosedTrial) -> str:
-    """Right, wrong, void, or unknown; a catch trial answered wrongly is a lapse."""
+    """How a trial ended: right, wrong, void, or not known yet; a catch trial answered wrongly is a lapse."""
     if trial.status == "spoiled":
         return "void"
     if trial.correct is None:
@@ -82,7 +82,7 @@ def verdict(trial: ClosedTrial) -> str:
 
 
 def not_measured(trial: ClosedTrial) -> bool:
-    """Whether it counts without a measured acceleration."""
+    """Whether the trial counts although its acceleration was not measured."""
     return trial.correct is not None and trial.delivered_mps2 is None
 
 
@@ -127,7 +127,7 @@ def device_words(view: WatchView) -> str:
 
 
 def drift_words(view: WatchView) -> str:
-    """What the probes say; empty where there are none."""
+    """Number of responses that changed between probes, and how many changed more than allowed; empty without probes."""
     if not view.probes:
         return ""
     beyond = sum(drift.beyond for drift in view.drifts)

@@ -80,8 +80,8 @@ def timed_beside(seconds: float, rate_hz: float, before_others: bool) -> Iterato
 
 def _read(process: "subprocess.Popen[bytes]", seconds: float, run: BareRun) -> None:
     try:
-        said, _ = process.communicate(timeout=seconds + OVERTIME_S)
-        ticks, late, latest_s, granted = said.split()
+        output, _ = process.communicate(timeout=seconds + OVERTIME_S)
+        ticks, late, latest_s, granted = output.split()
         run.result = BareLoop(int(ticks), int(late), float(latest_s), int(granted) > 0)
     except (subprocess.TimeoutExpired, ValueError):
         run.why = "it gave no result"

@@ -44,11 +44,11 @@ def check_device(
     place_m: where trials start. total_cap_n: the largest force that will be requested, if known; safety: its parts.
     with_sensor: False where the device was opened without its accelerometer, of which nothing is said then.
     """
-    looks, info = [], device.info
+    samples, info = [], device.info
     for _ in range(LOOKS):
-        looks.append(device.look())
+        samples.append(device.look())
         clock.sleep(EVERY_S)
-    answered = [look for look in looks if look.position_m is not None or look.acceleration_mps2 is not None]
+    answered = [look for look in samples if look.position_m is not None or look.acceleration_mps2 is not None]
     sensors = (_handle(answered, place_m),) if answered else ()
     if answered and with_sensor:
         sensors = (*sensors, _accelerometer(answered) if info.has_sensor else _no_accelerometer())
@@ -69,9 +69,9 @@ def _answers(answered: int) -> DeviceFinding:
     return DeviceFinding("Answers", f"{answered} of {LOOKS} times", fine, "" if fine else advice)
 
 
-def _handle(looks: list[Look], place_m: tuple[float, float, float]) -> DeviceFinding:
-    positions_m = [look.position_m for look in looks if look.position_m is not None]
-    if len(positions_m) < ENOUGH * len(looks):
+def _handle(samples: list[Look], place_m: tuple[float, float, float]) -> DeviceFinding:
+    positions_m = [look.position_m for look in samples if look.position_m is not None]
+    if len(positions_m) < ENOUGH * len(samples):
         advice = "Switch the device off and on, and calibrate it as its manual says."
         return DeviceFinding("Handle", "its position is no number", fine=False, advice=advice)
     away_mm = MM_PER_M * math.dist(np.mean(positions_m, axis=0), place_m)
@@ -80,14 +80,14 @@ def _handle(looks: list[Look], place_m: tuple[float, float, float]) -> DeviceFin
     return DeviceFinding("Handle", f"{away_mm:.1f} mm from its place", fine, "" if fine else advice)
 
 
-def _accelerometer(looks: list[Look]) -> DeviceFinding:
-    readings = np.array([look.acceleration_mps2 for look in looks if look.acceleration_mps2 is not None])
-    clipped = sum(look.sensor_clipped for look in looks)
-    if len(readings) < ENOUGH * len(looks):
+def _accelerometer(samples: list[Look]) -> DeviceFinding:
+    readings = np.array([look.acceleration_mps2 for look in samples if look.acceleration_mps2 is not None])
+    clipped = sum(look.sensor_clipped for look in samples)
+    if len(readings) < ENOUGH * len(samples):
         return _accelerometer_problem("its reading is no number", "Check the sensor's cable and its power.")
     if clipped:
         return _accelerometer_problem(
-            f"at its limit in {clipped} of {len(looks)} readings",
+            f"at its limit in {clipped} of {len(samples)} readings",
             "Lay the handle at rest. If that does not help, check the sensor's range, cable and mounting.",
         )
     return _noise(readings)

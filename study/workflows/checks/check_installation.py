@@ -145,9 +145,9 @@ def check_privacy(data: Path) -> DeviceFinding:
     name = "Data rights"
     if not data.exists():
         return DeviceFinding(name, f"{data}: not there yet; it will be for this account alone", fine=True)
-    said = privacy_warning(data)
-    value = f"{data}: open to other accounts" if said else f"{data}: for this account alone"
-    return DeviceFinding(name, value, not said, said)
+    warning = privacy_warning(data)
+    value = f"{data}: open to other accounts" if warning else f"{data}: for this account alone"
+    return DeviceFinding(name, value, not warning, warning)
 
 
 def _always(requirement: Requirement) -> bool:

@@ -89,8 +89,8 @@ def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Call
 
 
 def _lateness_s(device: Device, clock: Clock, seconds: float, go_on: Callable[[float], bool]) -> FloatArray:
-    """Of the readings of a real device's own loop, as its telemetry stamps them, behind the earliest of them; of this
-    program's wake-ups where there is no such loop."""
+    """Lateness of the readings of a real device's own loop by its telemetry's time stamps, after the earliest of them;
+    where there is no such loop, of this program's wake-ups."""
     rate_hz = device.info.sample_rate_hz
     if device.info.simulated or not device.telemetry:
         return np.array(wake_at_every_tick(clock, rate_hz, seconds, go_on))

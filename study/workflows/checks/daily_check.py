@@ -96,7 +96,7 @@ def check_today(name: str, moving: Moving) -> CheckedToday:
 
 
 def check_on(device: Device, plan: RecordingPlan, moving: Moving) -> CheckedToday:
-    """As `check_today`, on an open device."""
+    """Carry out the check of `check_today` on an open device."""
     baseline, digest = _accepted_recording(device.info, plan.protocol)
     begun: list[str] = []
 
@@ -182,15 +182,15 @@ def _found_check(info: DeviceInfo) -> DeviceFinding:
         if local_parts(check.utc, machine_zone)[0] != day:
             return DeviceFinding("Daily check", f"none today; the last one was {when}", False, advice, warning=True)
         if check.baseline_sha256 != _accepted_digest(info):
-            said = f"none since it was accepted anew; the last one was {when}"
-            return DeviceFinding("Daily check", said, False, advice, warning=True)
+            text = f"none since it was accepted anew; the last one was {when}"
+            return DeviceFinding("Daily check", text, False, advice, warning=True)
         if not check.changes:
             return DeviceFinding("Daily check", f"it broke off ({when})", False, advice, warning=True)
         if check.passed:
             return DeviceFinding("Daily check", f"nothing changed since the acceptance ({when})", fine=True)
         changed = ", ".join(dict.fromkeys(str(each["kind"]) for each in check.changes if each["changed"]))
-        said = f"{changed} changed since the acceptance" if changed else "measured too inaccurately to tell a change"
-        return DeviceFinding("Daily check", f"{said} ({when})", False, advice, True)
+        text = f"{changed} changed since the acceptance" if changed else "measured too inaccurately to tell a change"
+        return DeviceFinding("Daily check", f"{text} ({when})", False, advice, True)
     return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
 
 

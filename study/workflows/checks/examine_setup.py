@@ -50,7 +50,8 @@ class Examination:
 
     @property
     def exit_code(self) -> ExitCode:
-        """By the worst finding: DEVICE if device or timing is wrong, beside any other finding. Warnings are ignored."""
+        """Exit code of the worst finding: DEVICE if device or timing is wrong, beside any other finding. Warnings are
+        ignored."""
         timing = self.timing.findings if self.timing is not None else ()
         if any(finding.wrong for finding in (*self.device.findings, *timing)):
             return ExitCode.DEVICE
@@ -103,7 +104,7 @@ def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[f
 
 
 def _settings(name: str, timing_s: float) -> DeviceSettings:
-    """As for a study, but without the centring spring: nothing may move while the loop is timed."""
+    """Settings of a study, but without the centring spring: nothing may move while the loop is timed."""
     settings = device_settings(read_study_protocol(PROTOCOL).protocol)
     longest_s = max(settings.limits.longest_hold_s, timing_s + SPARE_S)
     limits = replace(settings.limits, longest_hold_s=longest_s)
@@ -136,5 +137,5 @@ def accept(name: str, examination: Examination, operator: str, moving: Moving) -
     baseline = record_baseline(name, moving) if sensed else ("", "")
     moving.announce(proof_notice(name, proof_force_n()))
     settings = replace(_settings(name, 0.0), with_sensor=sensed)
-    said = accept_device(name, settings, RealClock(), operator, baseline)
-    return said if sensed else f"{said}. Without an accelerometer no daily check will be possible."
+    sentence = accept_device(name, settings, RealClock(), operator, baseline)
+    return sentence if sensed else f"{sentence}. Without an accelerometer no daily check will be possible."

@@ -4,17 +4,17 @@ from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 
-from study.errors import LeftError
+from study.errors import UserInterruptError
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
 
 
 def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], None]) -> Path:
-    """Run it and return the path of diagnosis.json. Raises StudyError; LeftError if it was stopped."""
+    """Run it and return the path of diagnosis.json. Raises StudyError; UserInterruptError if it was stopped."""
     try:
         return diagnose_recordings(plan, on_progress).out / DIAGNOSIS_NAME
     except KeyboardInterrupt as stopped:
-        raise LeftError(
+        raise UserInterruptError(
             "The diagnosis was stopped",
             "It was not at its end.",
             "Start it again when there is time.",

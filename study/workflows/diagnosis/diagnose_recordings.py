@@ -25,7 +25,6 @@ from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.store.disk.new_folder import new_folder, require_new_folder
 from study.workflows.crash_guard import crash_guard
-from study.workflows.diagnosis.clean_recordings import with_clean
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
     not_diagnosable_error,
@@ -38,7 +37,7 @@ from study.workflows.forked_map import map_forked, processor_s
 READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
 """Progress after reading, after fitting a model where none was given, and after the diagnosis."""
 
-TWIN_SAID = (
+TWIN_REMARK = (
     "No model was given. The session was compared with the simulated device's twin: a linear model, identified from "
     "recordings without a hand at the handle, as `hapteq twin` writes it."
 )
@@ -106,11 +105,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
     plain = plan.model is None and not plan.clean
-    found = read_input(plan.sources, plan.seed, plain, plan.force_constants)
-    clean: DiagnosisInput | None = None
-    if plan.clean:
-        both = with_clean(found, plan.sources, plan.clean, plan.seed)
-        found, clean = both.found, both.clean
+    found, clean = _add_clean(plan, read_input(plan.sources, plan.seed, plain, plan.force_constants))
     on_progress("reading", READ)
     time_left = _time_budget(plan)
     guard = crash_guard()
@@ -140,6 +135,17 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     return Answer(
         findings, plan, (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
     )
+
+
+def _add_clean(plan: DiagnosePlan, found: DiagnosisInput) -> tuple[DiagnosisInput, DiagnosisInput | None]:
+    """The recordings, and those of the device in order in the same form; None where the plan has none."""
+    if not plan.clean:
+        return found, None
+    # Imported here: most diagnoses have no recordings of the device in order.
+    from study.workflows.diagnosis.clean_recordings import with_clean
+
+    both = with_clean(found, plan.sources, plan.clean, plan.seed)
+    return both.found, both.clean
 
 
 def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
@@ -226,7 +232,7 @@ def _model(
     if plan.model is not None:
         return FirstModel(read_given_model(plan.model, found), ())
     if found.simulated:
-        return FirstModel(_twin(within), (TWIN_SAID,))
+        return FirstModel(_twin(within), (TWIN_REMARK,))
     # Imported here: a given model needs no fit of a first one.
     from study.workflows.diagnosis.fit_without_model import first_model_of, fit_linear_model
 

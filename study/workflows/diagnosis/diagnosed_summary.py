@@ -11,7 +11,7 @@ from study.store.formats.diagnosis_file import MODEL_NAME, PAGE_NAME
 
 
 def summary(findings: Findings) -> dict[str, Any]:
-    """As in diagnosis.json."""
+    """The diagnosis as plain values, as in diagnosis.json."""
     return {"format": FORMAT, "version": VERSION, **diagnosis_to_json(findings.diagnosis)}
 
 
@@ -27,9 +27,9 @@ def answer_lines(findings: Findings) -> tuple[str, ...]:
     )
 
 
-def new_remarks(written: Findings, said: Findings) -> tuple[str, ...]:
+def new_remarks(written: Findings, earlier: Findings) -> tuple[str, ...]:
     """Remarks that were added after the answer was printed."""
-    return tuple(remark for remark in written.remarks if remark not in said.remarks)
+    return tuple(remark for remark in written.remarks if remark not in earlier.remarks)
 
 
 def file_lines(out: Path) -> tuple[str, ...]:

@@ -69,7 +69,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
 
 
 def first_model_lines(done: FirstModel) -> tuple[str, ...]:
-    """For a person: the chosen structure and why, the parameters, the residual."""
+    """Lines for the terminal: the chosen structure and why, the parameters, the residual."""
     choice, fit = done.choice, done.choice.fit
     rows = [_row(number) for number in fit.numbers]
     errors = [
@@ -84,7 +84,7 @@ def first_model_lines(done: FirstModel) -> tuple[str, ...]:
 
 
 def first_model_summary(done: FirstModel) -> dict[str, Any]:
-    """As one JSON document."""
+    """The fitted model as plain values, for one JSON document."""
     choice, fit = done.choice, done.choice.fit
     return {
         "model": str(done.plan.out),

@@ -1,4 +1,4 @@
-"""First model for a diagnosis without a given one; refusals become errors for a person."""
+"""First model for a diagnosis without a given one; refusals become errors that a person can act on."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,27 +13,29 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error
 from study.workflows.forked_map import map_forked
 
-GIVE_ONE = "Give a model of the device alone with --model, or a recording that carries one."
+GIVE_A_MODEL = "Give a model of the device alone with --model, or a recording that carries one."
 
 
 def first_model_of(
     found: DiagnosisInput, without: Sequence[str], bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> FirstModel:
-    """As in `analysis`; if the force balance crashes, by a fit to spectra. Raises StudyError."""
+    """Fit a first model by force balance; if the balance crashes, to spectra. bounds: remaining time, and the guard
+    that catches crashes. Raises StudyError."""
     time_left, guard = bounds
 
-    def weighed() -> FirstModel | None:
+    def fit_by_balance() -> FirstModel | None:
         return fit_without_model.first_model_of(found.recordings, without, time_left, on_progress, map_forked)
 
     with _translate_refusals():
-        first = guard.part(BALANCE, "the first model", weighed, None, (NothingToDiagnose,))
+        first = guard.part(BALANCE, "the first model", fit_by_balance, None, (NothingToDiagnose,))
     return first or FirstModel(*fit_linear_model(found, lambda share: on_progress("fitting a linear model", share)), ())
 
 
 def fit_linear_model(
     found: DiagnosisInput, on_progress: Callable[[float], None], whose: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """A linear model fitted to the spectra, and remarks, as in `analysis`. Raises StudyError."""
+    """Fit a linear model to the spectra; also returns remarks. whose: origin of the recordings, for the model's name.
+    Raises StudyError."""
     with _translate_refusals():
         return fit_without_model.fit_first_linear_model(found.recordings, on_progress, whose)
 
@@ -43,4 +45,4 @@ def _translate_refusals() -> Iterator[None]:
     try:
         yield
     except NothingToDiagnose as refusal:
-        raise not_diagnosable_error(refusal.problems, GIVE_ONE) from refusal
+        raise not_diagnosable_error(refusal.problems, GIVE_A_MODEL) from refusal

@@ -40,11 +40,11 @@ def find_references(session: Path) -> SessionReferences | None:
     if not paths:
         return None
     what = "the reference" if len(paths) == 1 else f"the {len(paths)} references"
-    said = (
+    text = (
         f"Of {folder.name} {what} without a hand went into the diagnosis, and not its trials, which show single "
         "frequencies with a hand."
     )
-    return SessionReferences(folder.log, paths, (said, *_drifts(folder, folded)))
+    return SessionReferences(folder.log, paths, (text, *_drifts(folder, folded)))
 
 
 def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
@@ -57,7 +57,7 @@ def _drifts(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
     watched = begin_watching(folded.state.opened, folded.state.protocol)
     for event in folded.contents.events[1:]:
         watched = follow(watched, event)
-    told = "; ".join(drift.sentence for drift in DriftReader(folder).look(watched.probes))
+    text = "; ".join(drift.sentence for drift in DriftReader(folder).look(watched.probes))
     return (
-        f"In its {len(watched.probes)} probes {f'there changed: {told}' if told else 'nothing is seen to change'}.",
+        f"In its {len(watched.probes)} probes {f'there changed: {text}' if text else 'nothing is seen to change'}.",
     )

@@ -24,7 +24,8 @@ def check_same_device(calibration: LinkageCalibration, device: str, title: str) 
 
 
 def inertia_effects(model: MechanicalModel, calibration: LinkageCalibration) -> tuple[ModelEffect, ...]:
-    """At the centre; an axis along which the inertia stays the same has none.
+    """Change of inertia along each axis at the centre, as effects; an axis along which the inertia stays the same has
+    none.
 
     The effect's `per_m` counts the mass on the drive's side of the cables alone, so it is larger than of the whole.
     """
@@ -43,8 +44,8 @@ def calibration_notes(
 ) -> tuple[str, ...]:
     """Sentences. identified_kg: (3,), masses along the axes as the recordings say."""
     inertia, slopes = inertia_about(calibration, np.zeros(3))
-    told = np.diag(inertia)
-    apart = float(np.abs(identified_kg / told - 1).max())
+    masses_kg = np.diag(inertia)
+    apart = float(np.abs(identified_kg / masses_kg - 1).max())
     named = {effect.axis for effect in model.effects}
     changing = ", ".join(
         f"{slope:.3g} kg/m along {letter}"
@@ -52,7 +53,7 @@ def calibration_notes(
         if letter in named
     )
     return (
-        f"The calibration of the {calibration.device} says {', '.join(f'{each:.3g}' for each in told)} kg at the "
+        f"The calibration of the {calibration.device} says {', '.join(f'{each:.3g}' for each in masses_kg)} kg at the "
         f"centre; the recordings say {', '.join(f'{each:.3g}' for each in identified_kg)} kg, up to {apart:.0%} apart. "
         "The model has those of the recordings, with all that moves at the handle.",
         f"How its inertia changes is the calibration's, as pose_dependent_inertia: {changing or 'nowhere'}. What "

@@ -11,7 +11,7 @@ from study.workflows.diagnosis.write_twin import WrittenTwin
 
 
 def twin_summary(written: WrittenTwin) -> dict[str, Any]:
-    """As one JSON document."""
+    """The written twin as plain values, for one JSON document."""
     model, fit, tolerance = written.model, written.fit, written.model.tolerance
     return {
         "model": str(written.plan.out),
@@ -43,7 +43,7 @@ def twin_summary(written: WrittenTwin) -> dict[str, Any]:
 
 
 def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
-    """For a person."""
+    """Lines for the terminal."""
     model, fit, tolerance = written.model, written.fit, written.model.tolerance
     piece = written.piece
     lines = [

@@ -50,8 +50,8 @@ class TwinPlan:
     band_hz: tuple[float, float] = (3.0, 60.0)
     """The study's frequencies with a margin; higher modes would cost time in each simulation."""
     calibration: Path | None = None
-    """Of the device's linkage. The simulated device takes its linkage and masses; the model says how the inertia
-    changes along each axis."""
+    """Calibration of the device's linkage. The simulated device takes its linkage and masses; the model says how the
+    inertia changes along each axis."""
 
     @property
     def recorded(self) -> str:

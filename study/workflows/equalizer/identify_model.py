@@ -106,8 +106,8 @@ def _quality(found: IdentifiedRecordings, recordings: Sequence[Recording], teste
     misfit = misfit_of_estimate(identified.model, estimate)
     remarks = (*identified.remarks, *held_out_remarks(tested, identified.cost, misfit, recordings))
     measured = None if tested is None else (tested.error, tested.noise, tested.seconds)
-    said = tuple(_sentence(remark) for remark in remarks)
-    return model_quality(misfit.error, identified.scatter, measured, said, misfit.most)
+    sentences = tuple(_sentence(remark) for remark in remarks)
+    return model_quality(misfit.error, identified.scatter, measured, sentences, misfit.most)
 
 
 def _sentence(remark: str) -> str:

@@ -26,7 +26,7 @@ from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracki
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
-from study.errors import DeviceError, LeftError, StudyError, WrongUseError
+from study.errors import DeviceError, StudyError, UserInterruptError, WrongUseError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.disk.json_document import write_json
@@ -63,7 +63,7 @@ class ContactPlan:
     out: Path
     device: str = "simulated"
     scale: float = 1.0
-    """Of the recording."""
+    """Factor on the recording."""
     weight: float = 1e-3
     cap_n: float = 3.0
     seed: int = 1
@@ -217,12 +217,12 @@ def _play_both(
             if device.fault() is Fault.FORCE_LEFT:
                 raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, AGAIN, NOTHING) from None
             happened = f"{len(measured)} of {len(forces)} plays were measured; the force was released."
-            raise LeftError("Interrupted", happened, AGAIN, NOTHING) from interruption
+            raise UserInterruptError("Interrupted", happened, AGAIN, NOTHING) from interruption
     return measured
 
 
 def _settings(plan: ContactPlan, models: ModelsForPlaying, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
-    """Without fade-in: a force that begins with the contact begins with a step."""
+    """Settings of the device, without fade-in: a force that begins with the contact begins with a step."""
     settings, rate_hz = playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
     steps = [np.linalg.norm(np.diff(each, axis=0, prepend=0, append=0), axis=1).max() for each in forces]
     slew_n_per_s = max(settings.limits.slew_n_per_s, float(max(steps)) * rate_hz + SPRING_SLEW_N_PER_S)
@@ -277,7 +277,7 @@ def contact_summary(done: ContactPlay) -> dict[str, Any]:
 
 
 def contact_lines(done: ContactPlay) -> tuple[str, ...]:
-    """For the terminal."""
+    """Lines for the terminal."""
     found = contact_summary(done)
     low, high = done.band_hz
     return (

@@ -14,7 +14,7 @@ from equalizer.tracking.lqr.padding import CAUSAL
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, Fault, Played
 from study.devices.opening import needs_real_time, open_device
-from study.errors import DeviceError, LeftError, StudyError
+from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.formats.repeats_file import repeats_path
@@ -56,7 +56,7 @@ def repeat_playback(
             if device.fault() is Fault.FORCE_LEFT:
                 raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, AGAIN, saved) from None
             happened = f"{len(played)} of up to {plan.repeats + 1} plays were measured; the force was released."
-            raise LeftError("Interrupted", happened, AGAIN, saved) from interruption
+            raise UserInterruptError("Interrupted", happened, AGAIN, saved) from interruption
         except DeviceError as error:
             error.saved = _write_best(plan, states, played)
             raise

@@ -39,6 +39,8 @@ SAFE_SHARE = 0.9
 
 @dataclass(frozen=True, slots=True)
 class RepeatOrder:
+    """What is asked for: number of corrections and device."""
+
     repeats: int
     device: str
     earlier: Path | None = None
@@ -81,7 +83,7 @@ def repeat_trajectory(
         repeats=order.repeats,
         first_gain=gain,
         spring=spring,
-        first=_first(solved, order, spring),
+        first=_initial_forces(solved, order, spring),
         seed=order.seed,
         out=plan.out,
     )
@@ -150,6 +152,7 @@ def _require_repeatable(models: ModelsForPlaying) -> None:
 
 
 def _gain(tested: Convergence | None) -> float:
+    """Gain of the correction: `SAFE_SHARE` of the largest one that converges, at most 1. Raises StudyError."""
     if tested is None:
         return 1.0
     gain = min(1.0, SAFE_SHARE * tested.safe_beta)
@@ -162,7 +165,7 @@ def _gain(tested: Convergence | None) -> float:
     return gain
 
 
-def _first(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring) -> FloatArray | None:
+def _initial_forces(solved: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring) -> FloatArray | None:
     """Initial forces; None = the model's own, which the first play computes together with what follows the last row."""
     if order.earlier is not None:
         return earlier_forces(order.earlier, solved.wanted, solved.models.sha256)

@@ -30,8 +30,8 @@ class FileContent:
 
     @property
     def json_format(self) -> str | None:
-        said = self.json.get("format") if isinstance(self.json, dict) else None
-        return said if isinstance(said, str) else None
+        name = self.json.get("format") if isinstance(self.json, dict) else None
+        return name if isinstance(name, str) else None
 
     @property
     def header(self) -> tuple[str, ...]:

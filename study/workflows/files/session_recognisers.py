@@ -35,7 +35,7 @@ DOCUMENTS = {
     WITHDRAWAL_FORMAT: ("withdrawal that was begun", ()),
     TOMBSTONE_FORMAT: ("tombstone of a withdrawn session", ("session", "withdrawn_utc")),
 }
-"""By format: kind in words, and required keys."""
+"""Kind in words and required keys, by format."""
 
 
 def recognise_session(content: FileContent) -> str | None:
@@ -122,11 +122,11 @@ def _recording_problems(folder: SessionFolder, folded: FoldedSession) -> list[st
 
 def _result_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
     """Results that contradict the log. Missing ones are due and not reported."""
-    said = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded.seal_due else []
+    texts = [f"{SEAL_NAME} is missing; hapteq resume writes it"] if folded.seal_due else []
     for result in result_problems(folder, folded.state):
         if not result.missing:
-            said += [f"{result.file} {problem}; the log alone is read" for problem in result.problems]
-    return said
+            texts += [f"{result.file} {problem}; the log alone is read" for problem in result.problems]
+    return texts
 
 
 def _describe(folded: FoldedSession) -> str:

@@ -42,8 +42,8 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
     """Validate one file. Never raises for its content or absence."""
     found = _validate(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
-    said = (privacy_warning(folder) for folder in folders if _is_folder(folder))
-    return replace(found, notes=(*found.notes, *filter(None, said), *_notes(found)))
+    warnings = (privacy_warning(folder) for folder in folders if _is_folder(folder))
+    return replace(found, notes=(*found.notes, *filter(None, warnings), *_notes(found)))
 
 
 def _notes(found: Validation) -> tuple[str, ...]:
@@ -105,8 +105,8 @@ def _of_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ()) -> Va
     except StudyError as refused:
         problem = f"{refused.title}: {refused.happened}"
         return Validation(path, kind or "recording of others", (*unknown, problem))
-    said = f"recording of others, {describe_recording(found.recording)}"
-    return Validation(path, said, tuple(silent_segments(found.recording)), found.notes)
+    text = f"recording of others, {describe_recording(found.recording)}"
+    return Validation(path, text, tuple(silent_segments(found.recording)), found.notes)
 
 
 def _describe_unknown(content: FileContent) -> tuple[str, str]:
@@ -114,8 +114,8 @@ def _describe_unknown(content: FileContent) -> tuple[str, str]:
     if content.is_folder:
         return "folder", "this folder is not a session: it holds no events.jsonl"
     if content.hdf5_format is not None:
-        said = f"calls itself '{content.hdf5_format}'" if content.hdf5_format else "has no attribute 'format'"
-        return "HDF5 file", f"it {said}; known formats are hapteq-recording, hapteq-model and hapteq-calibration"
+        sentence = f"calls itself '{content.hdf5_format}'" if content.hdf5_format else "has no attribute 'format'"
+        return "HDF5 file", f"it {sentence}; known formats are hapteq-recording, hapteq-model and hapteq-calibration"
     if not (content.text or "").strip():
         return "empty file", f"it holds nothing; {KNOWN}"
     match content.path.suffix.lower():

@@ -31,7 +31,7 @@ TITLE = "The linkage was not calibrated"
 SAVED = "Nothing moved and nothing was written."
 LARGEST_M = 0.2
 SHOWN = 3
-"""Problems that an error tells; the others are counted."""
+"""Number of problems that an error lists; the others are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
 
 
 def calibration_summary(written: WrittenCalibration) -> dict[str, Any]:
-    """As one JSON document."""
+    """The calibration as plain values, for one JSON document."""
     calibration = written.calibration
     centre = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
     masses = np.linalg.eigvalsh(calibration.inertia_kg)
@@ -107,19 +107,19 @@ def calibration_summary(written: WrittenCalibration) -> dict[str, Any]:
 
 
 def calibration_lines(written: WrittenCalibration) -> tuple[str, ...]:
-    """For a person."""
-    told = calibration_summary(written)
-    positions, (least, most) = told["positions"], told["mass_kg"]
-    along = ", ".join(f"{told['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))
-    held = ", ".join(f"{each:.2g}" for each in told["centre"]["gravity_n"])
+    """Lines for the terminal."""
+    found = calibration_summary(written)
+    positions, (least, most) = found["positions"], found["mass_kg"]
+    along = ", ".join(f"{found['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))
+    held = ", ".join(f"{each:.2g}" for each in found["centre"]["gravity_n"])
     return (
-        f"{told['device']}, {told['details']}: {positions['read']} positions read, {positions['filled']} filled in by "
-        f"mirror lines, {positions['unknown']} unknown",
+        f"{found['device']}, {found['details']}: {positions['read']} positions read, {positions['filled']} filled in "
+        f"by mirror lines, {positions['unknown']} unknown",
         f"Inertia at the centre along x, y, z: {along} kg; {least:.3g} to {most:.3g} kg over all positions and "
         f"directions; held against gravity by {held} N",
         "Mirror lines, largest difference of inertia: "
-        + "; ".join(f"{line['azimuth_deg']:.0f} degrees {line['asymmetry']:.2%}" for line in told["lines"]),
-        f"Jacobian against finite differences of its own positions: {told['difference']:.2%}",
+        + "; ".join(f"{line['azimuth_deg']:.0f} degrees {line['asymmetry']:.2%}" for line in found["lines"]),
+        f"Jacobian against finite differences of its own positions: {found['difference']:.2%}",
     )
 
 
@@ -171,9 +171,9 @@ def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
 def _difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
     """Zero where a neighbour is out of reach, or where there is no number to compare: that is refused by itself."""
     positions = beside(reading.position_m)
-    told = [each for position in positions if (each := linkage.angles_at(position)) is not None]
-    angles = np.array(told)
-    if len(told) < len(positions) or not np.isfinite(angles).all() or not np.isfinite(reading.jacobian).all():
+    rows = [each for position in positions if (each := linkage.angles_at(position)) is not None]
+    angles = np.array(rows)
+    if len(rows) < len(positions) or not np.isfinite(angles).all() or not np.isfinite(reading.jacobian).all():
         return 0.0
     return difference_error(reading.jacobian, positions, angles)
 

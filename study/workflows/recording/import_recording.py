@@ -12,7 +12,7 @@ from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.importing.arrays.arrays import Arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_map, header_notes, header_problems, read_headed
+from study.importing.header_map import header_map, header_notes, header_problems, read_without_map
 from study.importing.map_format.import_map import ImportMap
 from study.importing.map_format.map_errors import (
     NOTHING_WRITTEN,
@@ -36,7 +36,7 @@ class ImportPlan:
     """Foreign files, the map to a recording, and the output."""
 
     files: tuple[Path, ...]
-    """Or one folder, whose map is searched for."""
+    """Files, or one folder in which a map is searched for."""
     map: str | None
     """Name of a shipped map, or a path; None if headers suffice."""
     out: Path
@@ -61,10 +61,10 @@ def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: Non
     check_free(plan.out)
     read = read_foreign(plan.files, plan.map, on_progress)
     provenance = gather_provenance(parents=read.files).as_dict()
-    said: dict[str, Any] = {"map": read.map, "notes": list(read.notes)}
+    origin: dict[str, Any] = {"map": read.map, "notes": list(read.notes)}
     if read.map_hash:
-        said["map_sha256"] = read.map_hash
-    meta = {**read.recording.meta, "import": said, "provenance": provenance}
+        origin["map_sha256"] = read.map_hash
+    meta = {**read.recording.meta, "import": origin, "provenance": provenance}
     recording = replace(read.recording, meta=meta)
     write_recording(plan.out, recording)
     return Imported(plan.out, recording, read.map, read.notes)
@@ -82,7 +82,7 @@ class Foreign:
 
 
 def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progress = lambda share: None) -> Foreign:
-    """As `import_recording`, into memory. Raises StudyError."""
+    """Import recordings into memory; nothing is written. Raises StudyError."""
     if map_name is not None:
         source = read_map(map_name)
         return _by_map(source, _inside(files, source.map), on_progress)
@@ -119,7 +119,7 @@ def _by_found_map(folder: Path, on_progress: Progress) -> Foreign:
         return _by_map(found[0].source, found[0].files, on_progress)
     if not found:
         by_header = map_by_header(folder)
-        arrays = read_headed(by_header.files[0])
+        arrays = read_without_map(by_header.files[0])
         return _with_header(by_header.source.map, arrays, by_header.files, on_progress)
     listed = "; ".join(f"{entry.source.name} for {', '.join(path.name for path in entry.files)}" for entry in found)
     raise WrongUseError(
@@ -144,7 +144,7 @@ def _ours(files: Sequence[Path]) -> Foreign:
 
 
 def _by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
-    arrays = read_headed(files[0])
+    arrays = read_without_map(files[0])
     wanted = header_map(arrays)
     if wanted is None and (shipped := map_of_files(files)) is not None:
         found = _by_map(shipped, files, on_progress)

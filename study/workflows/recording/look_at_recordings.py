@@ -52,8 +52,8 @@ def recording_facts(found: Overview) -> tuple[str, ...]:
     ]
     left_out = ("provenance", "parts", "import")
     facts += [f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in meta.items() if key not in left_out]
-    said = meta.get("import")
-    notes = said.get("notes", ()) if isinstance(said, dict) else ()
+    origin = meta.get("import")
+    notes = origin.get("notes", ()) if isinstance(origin, dict) else ()
     return (*facts, *(f"import: {note}" for note in notes))
 
 

@@ -12,7 +12,7 @@ from protocols.document.hashing import protocol_hash
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
-from study.errors import DeviceError, LeftError
+from study.errors import DeviceError, UserInterruptError
 from study.session.stimulus.limits import limits_of_recording
 from study.session.stimulus.recording_plan import pieces
 from study.session.views.handle_notice import BeforeMoving, handle_notice, refuse_unannounced
@@ -55,8 +55,8 @@ def record_device(
     repeated. `before_moving(notice)` is called before a real device moves, with the notice for those around it; an
     exception from it keeps the device still. Without one, a real device is refused.
 
-    If interrupted (KeyboardInterrupt), the complete pieces are written, and LeftError says so. Raises StudyError before
-    anything moves if `out` exists already.
+    If interrupted (KeyboardInterrupt), the complete pieces are written, and UserInterruptError says so. Raises
+    StudyError before anything moves if `out` exists already.
     """
     check_free(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
@@ -70,7 +70,7 @@ def record_on(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
-    """As `record_device`, on an open device."""
+    """Record on an open device."""
     done: list[Take] = []
     try:
         if not device.info.simulated:
@@ -93,9 +93,9 @@ def check_free(out: Path) -> None:
     require_free(out, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
-def _left(plan: RecordingPlan, done: int) -> LeftError:
+def _left(plan: RecordingPlan, done: int) -> UserInterruptError:
     all_pieces = len(pieces(plan.protocol, NOMINAL_RATE_HZ))
-    return LeftError(
+    return UserInterruptError(
         "Interrupted",
         f"{done} of {all_pieces} pieces were recorded; the force was released.",
         "Record again under another name for the whole protocol.",

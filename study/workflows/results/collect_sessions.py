@@ -126,18 +126,18 @@ def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolde
 
 def _finish(folded: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
     """Write results that are due; problems are only reported, because the analysis uses the logs alone."""
-    said = []
+    texts = []
     for folder, session in folded:
         try:
             written = finish_tables(folder, session)
         except StudyError as problem:
-            said.append(f"{folder.name}: its results are not whole and could not be written. {problem.happened}")
+            texts.append(f"{folder.name}: its results are not whole and could not be written. {problem.happened}")
             continue
         if written:
-            said.append(
+            texts.append(
                 f"{folder.name}: written now from its log, because missing or out of date: {', '.join(written)}."
             )
-    return tuple(said)
+    return tuple(texts)
 
 
 def _choose_protocol(

@@ -76,7 +76,7 @@ class DriftReader:
             yield DriftLine(since_s, f"without a hand, {words}" if kind == "reference" else words, is_beyond(drift))
 
     def _take(self, probe: PlayedProbe) -> _Read | None:
-        """None where nothing was kept, or it cannot be used."""
+        """Read a probe's recording; None where nothing was kept, or it cannot be used."""
         if not probe.recording or probe.trouble:
             return None
         try:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from study.devices.device import Fault
-from study.errors import DeviceError, LeftError, StudyError
+from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.void_reasons import TOO_BUSY
 from study.session.views.counted import answers_are
 from study.store.sessions.archive import SessionFolder
@@ -45,12 +45,12 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
         raise already_finished(folded.state, folder)
     with hold_session_lock(folder.path):
         written = write_results(folder)
-    said = f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due)}."
-    return replace(written, warnings=(said, *written.warnings))
+    text = f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due)}."
+    return replace(written, warnings=(text, *written.warnings))
 
 
 def _not_finished(end: Conducted) -> StudyError:
-    kind = LeftError if end.fault is Fault.NONE else DeviceError
+    kind = UserInterruptError if end.fault is Fault.NONE else DeviceError
     return kind(
         "The session is not finished",
         f"The sitting ended: {end.left}.",
@@ -63,7 +63,7 @@ def _erase(end: Conducted, utc: str) -> StudyError:
     data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
     elsewhere = still_elsewhere(data, plan)
     withdraw(data, plan, utc)
-    return LeftError(
+    return UserInterruptError(
         "The participant withdrew",
         f"Everything recorded of {plan.subject} was erased: {', '.join(plan.sessions)}.",
         " ".join((*plan.doubtful, *elsewhere)),

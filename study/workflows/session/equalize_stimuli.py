@@ -96,7 +96,7 @@ def keep_model(equalized: Equalized, folder: SessionFolder) -> None:
 
 
 def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> Equalized:
-    """For a resumed session: its own model, which must be unchanged."""
+    """Equalizer of a resumed session: its own model, which must be unchanged."""
     facts = state.opened.equalized
     if facts is None:
         return NOT_EQUALIZED
@@ -112,7 +112,7 @@ def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInf
 
 
 def level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz: float) -> tuple[LevelScale, ...]:
-    """For every frequency: the level (N) that the more demanding direction needs for 1 m/s^2, onset included."""
+    """For each frequency, the level (N) that the more demanding direction needs for 1 m/s^2, onset included."""
     cap_n = protocol.staircase.cap_n
     scales = []
     for frequency_hz in protocol.all_frequencies_hz:

@@ -60,8 +60,8 @@ def begun_in(folder: SessionFolder) -> Begun | None:
 
 
 def _begun_in_damaged(folder: SessionFolder) -> Begun | None:
-    """From a damaged log. Holding a place too long costs a row of the balanced order; giving it twice costs the
-    balance."""
+    """Read the place from a damaged log. Holding a place too long costs a row of the balanced order; giving it twice
+    costs the balance."""
     try:
         content = read_regular(folder.log)
     except OSError:
@@ -74,7 +74,7 @@ def _begun_in_damaged(folder: SessionFolder) -> Begun | None:
 
 
 def _place(folder: SessionFolder, opening: SessionOpened) -> int | None:
-    """From the lines before the first trial, so that a long log is not read completely."""
+    """Read the place from the lines before the first trial, so that a long log is not read completely."""
     if not place_comes_later(opening):
         return opening.participant_number
     chain = Chain()

@@ -89,14 +89,14 @@ def _was_session(path: Path) -> bool:
 
 def analysis_names(folder: Path, subject: str) -> bool | None:
     """Whether the analysis in this folder contains this subject; None if that cannot be determined."""
-    said = [_rows_name(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
-    said.append(_statistics_name(folder / "anova.json", subject))
-    if any(said):
+    found = [_rows_name(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
+    found.append(_statistics_name(folder / "anova.json", subject))
+    if any(found):
         return True
     figure = re.compile(rf"(staircases|psychometric)-\d+-{re.escape(subject)}\.(svg|png)")
     if any(figure.fullmatch(path.name) for path in analysis_outputs(folder)):
         return True
-    return None if all(each is None for each in said) else False
+    return None if all(each is None for each in found) else False
 
 
 def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:

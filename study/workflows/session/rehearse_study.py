@@ -1,18 +1,17 @@
 """Rehearse a whole study with simulated participants, several at once; begun sessions are resumed, finished ones
 kept."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, resumable
 from study.participants.observer import Observer
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.participants.population import KINDS, member
 from study.store.disk.folder_contents import Files, read_file, read_files, write_files
 from study.store.disk.new_folder import new_folder
@@ -24,7 +23,7 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
 from study.workflows.session.conduct_session import Conducted, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
-from study.workflows.session.simulated_participant import seat_observer
+from study.workflows.session.simulated_participant import create_participant
 from study.workflows.worker_processes import worker_processes
 
 DEVICE = "simulated"
@@ -50,7 +49,7 @@ def rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
     kind = rehearsal.observer.replace("-", "_")
     if kind in KINDS:
         return member(kind, number + 1, rehearsal.seed)
-    return observer_named(kind, rehearsal.seed)
+    return find_observer(kind, rehearsal.seed)
 
 
 def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: Callable[[int], None]) -> None:
@@ -63,7 +62,8 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
     Raises StudyError where the folder holds a rehearsal of another protocol, seed or model.
     """
     _check_same(rehearsal)
-    with _resumable(rehearsal, "begun so far" if isinstance(workers, int) else "finished so far"):
+    kept = "begun so far" if isinstance(workers, int) else "finished so far"
+    with resumable("The rehearsal is not finished.", f"All sessions {kept} are in {rehearsal.data}."):
         if isinstance(workers, Executor):
             _rehearse_elsewhere(rehearsal, workers, on_finished)
             return
@@ -89,20 +89,6 @@ def _rehearse_elsewhere(rehearsal: Rehearsal, executor: Executor, on_finished: C
             write_files(part, files)
         _require_finished(session, why)
         on_finished(done)
-
-
-@contextmanager
-def _resumable(rehearsal: Rehearsal, kept: str) -> Iterator[None]:
-    """kept: which sessions are in the folder after an interruption."""
-    try:
-        yield
-    except KeyboardInterrupt as interruption:
-        raise LeftError(
-            "Interrupted",
-            "The rehearsal is not finished.",
-            "Run the same command again: it goes on where it stopped.",
-            saved=f"All sessions {kept} are in {rehearsal.data}.",
-        ) from interruption
 
 
 def subject_code(number: int) -> str:
@@ -133,7 +119,7 @@ def _sit(rehearsal: Rehearsal, number: int) -> None:
         return
     else:
         clock = VirtualClock.not_before(folded.state.sitting.last.utc)
-        conducted = conduct_resumed(begun, DEVICE, seat_observer(observer, seed, clock))
+        conducted = conduct_resumed(begun, DEVICE, create_participant(observer, seed, clock))
     write_tables(conducted.folder)
     _require_finished(conducted.folder.name, conducted.left)
 
@@ -162,7 +148,7 @@ def _play_new(rehearsal: Rehearsal, number: int) -> Conducted:
         participant_number=number,
         model=rehearsal.model,
     )
-    return conduct_new(plan, DEVICE, seat_observer(observer, seed, VirtualClock()))
+    return conduct_new(plan, DEVICE, create_participant(observer, seed, VirtualClock()))
 
 
 def _require_finished(session: str, why: str) -> None:

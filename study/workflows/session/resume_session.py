@@ -222,5 +222,5 @@ def _from_recording(
 
 
 def _sensor_of(logged: object) -> SensorFacts | None:
-    """As it stands in a recording. Raises ValueError where it is none."""
+    """The sensor's facts as they stand in a recording. Raises ValueError where the value is not one."""
     return None if logged is None else TypeAdapter(SensorFacts).validate_python(logged)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from protocols.procedure.practice import add_answer, practice_passed, right_of_last
 from protocols.trial import Phase
 from study.devices.device import Fault
-from study.errors import DeviceError, LeftError, StudyError
+from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.events import RestTaken, SessionClosed, SessionInterrupted
 from study.session.facts.void_reasons import busy_sentence, why_too_many
 from study.session.state.due_trial import Present, labels_are_swapped
@@ -48,8 +48,8 @@ class SessionEnd:
 def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Run until the session is finished or left.
 
-    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and becomes LeftError. Any StudyError is
-    extended by the number of saved answers and how to continue.
+    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and becomes UserInterruptError. Any
+    StudyError is extended by the number of saved answers and how to continue.
     """
     try:
         end = _sit(state, sitting)
@@ -107,7 +107,7 @@ def _end_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Sessi
     saved = f"{answers_are(state.answers)} on disk."
     if still_on:
         raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, way_back, saved) from interruption
-    raise LeftError("Interrupted", "The force was released.", way_back, saved) from interruption
+    raise UserInterruptError("Interrupted", "The force was released.", way_back, saved) from interruption
 
 
 def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:

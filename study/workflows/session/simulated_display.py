@@ -113,7 +113,8 @@ class SimulatedDisplay:
         return Answered(reply.answer, self._clock.now_s())
 
     def _wait_and_feel(self, felt: Felt, seconds: float, sign_of_life: SignOfLife) -> Felt | None:
-        """None where the sign of life ended the wait. A detection trial is over when the question comes."""
+        """Wait and return what is felt; None where the sign of life ended the wait. A detection trial is over when the
+        question comes."""
         touch, stimulus = self._touch, self._stimulus
         if touch is None or stimulus is None or felt.phase is Phase.DETECTION:
             return felt if self._wait(seconds, sign_of_life) else None

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from study.devices.clock import Clock
 from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.observer import Observer
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.session.views.views import Question
 from study.workflows.session.conduct_session import Participant
 from study.workflows.session.simulated_display import SimulatedDisplay
@@ -15,11 +15,12 @@ from study.workflows.session.simulated_touch import SimulatedTouch
 def make_simulated_participant(
     name: str, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
 ) -> Participant:
-    """By the name used on the command line and in the log. Raises StudyError for an unknown name."""
-    return seat_observer(observer_named(name, seed), seed, clock, on_question)
+    """Create the participant of a name used on the command line and in the log. Raises StudyError for an unknown
+    name."""
+    return create_participant(find_observer(name, seed), seed, clock, on_question)
 
 
-def seat_observer(
+def create_participant(
     observer: Observer, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
 ) -> Participant:
     """A participant that answers as this observer."""

@@ -35,7 +35,7 @@ class Withdrawal:
     """Sentences on what may be the participant's and is kept, to be checked."""
 
     @property
-    def made_from_them(self) -> tuple[str, ...]:
+    def derived_roots(self) -> tuple[str, ...]:
         """Folders or files of the data folder that contain analyses."""
         return tuple(dict.fromkeys(PurePosixPath(name).parts[0] for name in self.derived))
 

@@ -15,7 +15,7 @@ class Judgement:
     flags: tuple[str, ...]
     """Remarks on a trial that counts."""
     cause: VoidCause = VoidCause.FAULT
-    """Of a void trial."""
+    """Cause of a void trial."""
     measured: bool = True
     """Whether the acceleration can be trusted, where there is any."""
 
@@ -45,7 +45,7 @@ def judge(
         (health.sensor_clipped > 0, "accelerometer clipped"),
         (bool(missing), f"no trustworthy acceleration: {missing}"),
     )
-    return Judgement("", tuple(text for seen, text in observed if seen), measured=not missing)
+    return Judgement("", tuple(text for is_so, text in observed if is_so), measured=not missing)
 
 
 def _too_late(health: Health, settings: MeasurementSettings) -> str:

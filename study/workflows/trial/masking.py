@@ -21,8 +21,8 @@ LOOP_S = 60
 
 @contextlib.contextmanager
 def opened_sound(settings: MaskingSettings, clock: Clock, observer: str | None) -> Iterator[Sound | None]:
-    """None where the protocol wants none, or no person is there (a simulated participant, virtual time). Raises
-    `DeviceError`: before a session is begun."""
+    """Play the masking noise; None where the protocol wants none, or no person is there (a simulated participant,
+    virtual time). Raises `DeviceError`: before a session is begun."""
     if not settings.play or clock.virtual or observer is not None:
         yield None
         return

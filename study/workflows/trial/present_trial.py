@@ -45,7 +45,7 @@ def question_of(state: SessionState, present: Present) -> Question:
 
 
 def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
-    """None when a trial may start; otherwise why the wait was cut short."""
+    """Wait for the handle. None when a trial may start; otherwise why the wait was cut short."""
     gate = state.protocol.gate
     if gate.radius_mm <= 0:
         return None

@@ -31,7 +31,7 @@ class QueuedRequests:
 
 
 class ManyRequests:
-    """Several sources as one."""
+    """Combines several sources of requests."""
 
     def __init__(self, *sources: Requests) -> None:
         self._sources = sources

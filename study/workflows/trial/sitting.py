@@ -20,7 +20,7 @@ from study.workflows.trial.session_supervisor import SessionSupervisor
 
 
 class Pulse(Protocol):
-    """As `study.devices.onset_line` gives it."""
+    """Electrical pulse at the onset of a stimulus: the port that `study.devices.onset_line` provides."""
 
     @property
     def line(self) -> str: ...
@@ -46,7 +46,7 @@ class Sound(Protocol):
 
 
 def no_pulse() -> None:
-    """Where the lab has no line for onset pulses."""
+    """Pulse of a lab that has no line for it: does nothing."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,7 @@ def _says_study(path: Path) -> bool:
 
 
 def protocol_line(name: str, data: Path) -> ProtocolLine | None:
-    """None for a protocol of another kind. An invalid one is listed with its problem."""
+    """Line of a study protocol; None for a protocol of another kind. An invalid one is listed with its problem."""
     try:
         file = read_protocol(name, data)
     except ProtocolRefusedError as refused:

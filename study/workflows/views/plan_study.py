@@ -109,7 +109,7 @@ def _participant(code: str, sessions: Sequence[_Begun]) -> Participant:
 
 
 def _latest_protocol(name: str, begun: Sequence[_Begun]) -> StudyProtocol:
-    """Of the latest session whose log can be read. Raises WrongUseError where there is none."""
+    """Protocol of the latest session whose log can be read. Raises WrongUseError where there is none."""
     for each in sorted(begun, key=lambda each: each.line.begun_utc, reverse=True):
         if each.protocol_text is None:
             continue
@@ -209,7 +209,7 @@ def _said(plan: StudyPlan) -> str:
 
 
 def order_words(cell: Cell) -> str:
-    """Such as: 5, 45, 15, 35, 25 Hz, numbers swapped."""
+    """Order of runs in words, such as: 5, 45, 15, 35, 25 Hz, numbers swapped."""
     hertz = ", ".join(f"{frequency:g}" for frequency in cell.frequencies_hz)
     words = f"{hertz} Hz" if hertz else "by lot"
     return f"{words}, numbers swapped" if cell.swapped else words

@@ -32,7 +32,7 @@ TOLD = (
     "answer", "response_time_s", "status", "cause", "missed_ticks", "late_ticks", "latest_s", "delivered_mps2",
     "outcome",
 )  # fmt: skip
-"""Of each fact: nothing about the person, no notes, no forms."""
+"""Fields of each fact that are streamed: nothing about the person, no notes, no forms."""
 
 LAST = "session_closed"
 """No fact of a trial follows it, and it is never taken back."""
@@ -136,17 +136,17 @@ def _fact(line: bytes) -> dict[str, Any]:
 def _send(
     fact: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
 ) -> None:
-    told = {name: fact[name] for name in TOLD if fact.get(name) is not None}
+    fields = {name: fact[name] for name in TOLD if fact.get(name) is not None}
     happened_s = fact.get("monotonic_s")
     if isinstance(happened_s, float) and 0 <= now_s - happened_s <= FRESH_S:
         stamped_s = happened_s + offset_s
     else:
-        told["stamped"] = "when it was sent"
+        fields["stamped"] = "when it was sent"
         stamped_s = outlet.clock_s()
-    marker = _text(told)
+    marker = _text(fields)
     outlet.push(marker, stamped_s)
     on_marker(marker)
 
 
-def _text(told: dict[str, Any]) -> str:
-    return json.dumps(told, separators=(",", ":"))
+def _text(fields: dict[str, Any]) -> str:
+    return json.dumps(fields, separators=(",", ":"))

@@ -53,11 +53,11 @@ def _device(path: Path) -> Device | None:
 
 
 def _effect(effect: NamedEffect) -> tuple[str, ...]:
-    said = (
+    text = (
         f"{effect_sentence(effect)} It explains {_percent(effect.share)} of the mismatch left after re-tuning "
         f"(probability {_probability(effect.probability)})."
     )
-    return tuple(filter(None, (said, inseparable_sentence(effect))))
+    return tuple(filter(None, (text, inseparable_sentence(effect))))
 
 
 def _mismatches(mismatches: tuple[Mismatch, ...]) -> tuple[tuple[str, ...], ...]:

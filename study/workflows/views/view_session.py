@@ -58,7 +58,7 @@ def _whole(folder: SessionFolder, folded: FoldedSession, zone: Zone) -> SessionV
 
 def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
     due = ", ".join(due_results(folder, folded))
-    said = (
+    remarks = (
         (
             folded.contents.torn_bytes,
             "A crash tore the last line of the log; it is taken off when the session is resumed.",
@@ -66,7 +66,7 @@ def _log_remarks(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...
         (due, f"Missing or not as the log gives it: {due}. hapteq resume writes it."),
         (not folded.contents.chain.since, "The log carries no checksums: it was written before there were any."),
     )
-    return tuple(text for holds, text in said if holds)
+    return tuple(text for holds, text in remarks if holds)
 
 
 def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
@@ -76,9 +76,9 @@ def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> Ses
             line.name, line.path, line.subject, line.protocol, line.begun_utc, line.observer,
             line.answers, 0, line.runs, "unreadable", problem.happened,
         )  # fmt: skip
-    said = tuple(part for part in (problem.happened, problem.saved, problem.do_now) if part)
+    sentences = tuple(part for part in (problem.happened, problem.saved, problem.do_now) if part)
     events = log_in_words(readable_events(folder.log), zone)
-    return _bare(folder, line, warnings=(f"{problem.title}.", *said), events=events)
+    return _bare(folder, line, warnings=(f"{problem.title}.", *sentences), events=events)
 
 
 def _bare(

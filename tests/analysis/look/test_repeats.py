@@ -59,7 +59,7 @@ def test_declared_periods_are_taken_and_checked(recording):
     command = tiled(500, 8)
     right = recording(command, command, segments=(Segment(0, 4000, "noise", period=500),))
     seen = find_repeats(right, [(0, 4000)])
-    assert (seen.found, seen.noise[0].looks, seen.noise[0].segment) == (0, 7, 1)
+    assert (seen.found, seen.noise[0].periods, seen.noise[0].segment) == (0, 7, 1)
     assert {check.level for check in repeat_checks(right, seen)} == {"fine"}
     wrong = recording(command, command, segments=(Segment(0, 4000, "noise", period=480),))
     (check, *_) = repeat_checks(wrong, find_repeats(wrong, [(0, 4000)]))

@@ -58,7 +58,7 @@ def test_models_come_first_and_a_table_behind_them(run, files, missing):
     model, table, *rest = files
     code, _, err = run(*{"table": [model], "model": [table], "order": [table, model]}[missing], *rest)
     assert code == 2
-    assert err.startswith("What shall be equalized?")
+    assert err.startswith("Models or the table are missing")
 
 
 @pytest.mark.parametrize("part", [["--repeat", 3], ["--device", "simulated"], ["--from", "old.csv"]])

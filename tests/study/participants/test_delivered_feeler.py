@@ -7,7 +7,7 @@ import pytest
 from protocols.trial import Phase
 from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.observer import Felt
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.participants.population import TYPICAL_THRESHOLDS_N, member, person
 from study.session.stimulus.delivered import Delivered
 
@@ -18,7 +18,7 @@ THRESHOLD_N = dict(TYPICAL_THRESHOLDS_N)[15.0]
 
 @pytest.fixture
 def observer():
-    return observer_named("delivered", 0)
+    return find_observer("delivered", 0)
 
 
 def felt(level_n=THRESHOLD_N, along=1.0, across=0.0, harmonics=0.0, trial=0):
@@ -64,7 +64,7 @@ def test_the_delivered_population_has_the_thresholds_of_the_population(observer)
     found = member("delivered", 3, 5)
     assert isinstance(found, DeliveredFeeler)
     assert (found.feeler, found.name) == (person(3, 5), "delivered_3_seed_5")
-    assert observer_named("delivered_3_seed_5", 0) == found
+    assert find_observer("delivered_3_seed_5", 0) == found
 
 
 def test_detection_and_what_was_not_measured_go_by_the_command(observer):

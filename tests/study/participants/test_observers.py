@@ -14,7 +14,7 @@ from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.intensity_cue import IntensityCue
 from study.participants.observer import Felt, Observer
-from study.participants.observers import OBSERVERS, observer_named
+from study.participants.observers import OBSERVERS, find_observer
 from study.participants.population import TYPICAL_THRESHOLDS_N
 
 FELT = Felt(
@@ -54,7 +54,7 @@ def share_of_1(observer: Observer, felt: list[Felt], seed: int = 1) -> float:
 
 @pytest.mark.parametrize(("frequency_hz", "threshold_n"), TYPICAL_THRESHOLDS_N)
 def test_the_ideal_observer_is_right_79_percent_of_the_time_at_threshold(frequency_hz, threshold_n):
-    ideal = observer_named("ideal", 0)
+    ideal = find_observer("ideal", 0)
     assert share_right(ideal, trials(frequency_hz, threshold_n)) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
 
 
@@ -63,12 +63,12 @@ def test_the_ideal_observers_answers_follow_the_weibull_curve(level_n):
     """Textbook form: 0.5 + 0.5 (1 - exp(-(x/a)^b)), a put so that 0.6 N gives the cube root of one half."""
     a = 0.6 / (-np.log(2 - 2 * 0.5 ** (1 / 3))) ** (1 / 2)
     expected = 0.5 + 0.5 * (1 - np.exp(-((level_n / a) ** 2)))
-    assert share_right(observer_named("ideal", 0), trials(level_n=level_n)) == pytest.approx(expected, abs=FOUR_ERRORS)
+    assert share_right(find_observer("ideal", 0), trials(level_n=level_n)) == pytest.approx(expected, abs=FOUR_ERRORS)
 
 
 def test_the_lapsing_observer_stays_below_certainty_where_the_ideal_one_is_certain():
-    assert share_right(observer_named("lapsing", 0), trials(level_n=3.0)) == pytest.approx(0.95, abs=FOUR_ERRORS)
-    assert share_right(observer_named("ideal", 0), trials(level_n=3.0)) == 1.0
+    assert share_right(find_observer("lapsing", 0), trials(level_n=3.0)) == pytest.approx(0.95, abs=FOUR_ERRORS)
+    assert share_right(find_observer("ideal", 0), trials(level_n=3.0)) == 1.0
 
 
 @pytest.mark.parametrize(("criterion", "expected"), [(0.0, 0.7937), (0.25, 0.786), (0.5, 0.766), (1.0, 0.697)])
@@ -81,30 +81,30 @@ def test_a_liking_for_one_answer_lowers_the_share_of_right_ones_as_detection_the
 
 def test_the_biased_observer_says_1_more_often_and_the_ideal_one_does_not():
     felt = trials(level_n=0.05)
-    assert share_of_1(observer_named("biased", 0), felt) == pytest.approx(0.69, abs=FOUR_ERRORS + 0.005)
-    assert share_of_1(observer_named("ideal", 0), felt) == pytest.approx(0.50, abs=FOUR_ERRORS)
+    assert share_of_1(find_observer("biased", 0), felt) == pytest.approx(0.69, abs=FOUR_ERRORS + 0.005)
+    assert share_of_1(find_observer("ideal", 0), felt) == pytest.approx(0.50, abs=FOUR_ERRORS)
 
 
 @pytest.mark.parametrize("name", ["guesser", "alternator", "always_1", "always_2"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_who_feels_nothing_is_at_chance_even_at_the_cap_and_with_the_sessions_seed(name, seed):
     felt = trials(level_n=3.0, seed=seed)
-    assert share_right(observer_named(name, seed), felt, seed) == pytest.approx(0.5, abs=FOUR_ERRORS)
+    assert share_right(find_observer(name, seed), felt, seed) == pytest.approx(0.5, abs=FOUR_ERRORS)
 
 
 def test_the_alternator_alternates_over_the_whole_session():
-    alternator = observer_named("alternator", 0)
+    alternator = find_observer("alternator", 0)
     answers = [alternator.reply(replace(FELT, run=n // 3, trial=n % 3, trials_before=n), 1).answer for n in range(7)]
     assert answers == [1, 2, 1, 2, 1, 2, 1]
 
 
 def test_the_constant_observers_are_constant():
-    assert share_of_1(observer_named("always_1", 0), trials()) == 1.0
-    assert share_of_1(observer_named("always_2", 0), trials()) == 0.0
+    assert share_of_1(find_observer("always_1", 0), trials()) == 1.0
+    assert share_of_1(find_observer("always_2", 0), trials()) == 0.0
 
 
 def test_vibration_without_direction_above_its_frequency_and_full_sense_below():
-    observer = observer_named("vibration_only", 0)
+    observer = find_observer("vibration_only", 0)
     assert share_right(observer, trials(25.0, 3.0)) == pytest.approx(0.5, abs=FOUR_ERRORS)
     assert share_right(observer, trials(15.0, 3.0)) == 1.0
 
@@ -112,7 +112,7 @@ def test_vibration_without_direction_above_its_frequency_and_full_sense_below():
 @pytest.mark.parametrize(("level_n", "expected"), [(3.0, 0.9331), (0.1, 0.8556), (0.01, 0.5594)])
 def test_the_intensity_cue_works_wherever_strength_can_be_judged(level_n, expected):
     """Phi(3 dB / (2 x 1 dB sqrt(1 + (0.1 N / level)^2)))."""
-    assert share_right(observer_named("intensity_cue", 0), trials(level_n=level_n)) == pytest.approx(
+    assert share_right(find_observer("intensity_cue", 0), trials(level_n=level_n)) == pytest.approx(
         expected, abs=FOUR_ERRORS
     )
 
@@ -124,7 +124,7 @@ def test_without_a_difference_in_strength_the_intensity_cue_is_chance():
 
 
 def test_the_drifting_observers_threshold_rises_by_a_decibel_in_100_trials():
-    drifting, ideal = observer_named("drifting", 0), observer_named("ideal", 0)
+    drifting, ideal = find_observer("drifting", 0), find_observer("ideal", 0)
     assert isinstance(drifting, DirectionFeeler)
     assert isinstance(ideal, DirectionFeeler)
     late = replace(FELT, trials_before=300, level_n=0.6 * 10 ** (3 / 20))
@@ -133,7 +133,7 @@ def test_the_drifting_observers_threshold_rises_by_a_decibel_in_100_trials():
 
 
 def test_between_frequencies_thresholds_lie_between_and_beyond_the_ends_they_stay():
-    ideal = observer_named("ideal", 0)
+    ideal = find_observer("ideal", 0)
     assert isinstance(ideal, DirectionFeeler)
     shares = [ideal.share_right(replace(FELT, frequency_hz=f)) for f in (1.0, 5.0, 10.0, 15.0, 45.0, 200.0)]
     assert shares[0] == shares[1] > shares[2] > shares[3] > shares[4] == shares[5]
@@ -146,7 +146,7 @@ def detection(frequency_hz: float, level_n: float) -> list[Felt]:
 @pytest.mark.parametrize(("frequency_hz", "threshold_n"), TYPICAL_DETECTION_N)
 def test_the_interval_is_found_79_percent_of_the_time_at_the_detection_threshold(frequency_hz, threshold_n):
     felt = detection(frequency_hz, threshold_n)
-    assert share_right(observer_named("ideal", 0), felt) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
+    assert share_right(find_observer("ideal", 0), felt) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
 
 
 @pytest.mark.parametrize("level_n", [0.02, 0.05, 0.1, 0.2])
@@ -154,35 +154,35 @@ def test_finding_the_interval_follows_a_weibull_curve_of_its_own(level_n):
     """Textbook form, with slope 2.5 and a so that 0.08 N gives the cube root of one half."""
     a = 0.08 / (-np.log(2 - 2 * 0.5 ** (1 / 3))) ** (1 / 2.5)
     expected = 0.5 + 0.5 * (1 - np.exp(-((level_n / a) ** 2.5)))
-    found = share_right(observer_named("ideal", 0), detection(15.0, level_n))
+    found = share_right(find_observer("ideal", 0), detection(15.0, level_n))
     assert found == pytest.approx(expected, abs=FOUR_ERRORS)
 
 
 @pytest.mark.parametrize("name", ["ideal", "vibration_only", "intensity_cue"])
 def test_who_finds_no_direction_feels_the_vibration_all_the_same(name):
-    observer = observer_named(name, 0)
+    observer = find_observer(name, 0)
     assert share_right(observer, detection(35.0, 0.5)) > 0.99
     assert share_right(observer, trials(35.0, 0.02)) < 0.7
 
 
 def test_the_intensity_cue_finds_the_interval_79_percent_of_the_time_at_its_detection_level():
-    cue = observer_named("intensity_cue", 0)
+    cue = find_observer("intensity_cue", 0)
     assert share_right(cue, detection(25.0, 0.1)) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
 
 
 @pytest.mark.parametrize("name", ["guesser", "alternator", "always_1", "always_2"])
 def test_who_feels_nothing_finds_no_interval(name):
-    assert share_right(observer_named(name, 1), detection(15.0, 3.0)) == pytest.approx(0.5, abs=FOUR_ERRORS)
+    assert share_right(find_observer(name, 1), detection(15.0, 3.0)) == pytest.approx(0.5, abs=FOUR_ERRORS)
 
 
 def test_lapses_and_a_liking_for_1_show_in_detection_trials_too():
-    assert share_right(observer_named("lapsing", 0), detection(15.0, 3.0)) == pytest.approx(0.95, abs=FOUR_ERRORS)
-    liked = share_of_1(observer_named("biased", 0), detection(15.0, 0.005))
+    assert share_right(find_observer("lapsing", 0), detection(15.0, 3.0)) == pytest.approx(0.95, abs=FOUR_ERRORS)
+    liked = share_of_1(find_observer("biased", 0), detection(15.0, 0.005))
     assert liked == pytest.approx(0.69, abs=FOUR_ERRORS + 0.005)
 
 
 def test_a_drift_raises_the_detection_threshold_too():
-    drifting = observer_named("drifting", 0)
+    drifting = find_observer("drifting", 0)
     assert isinstance(drifting, DirectionFeeler)
     early = replace(FELT, phase=Phase.DETECTION, level_n=0.08)
     late = replace(early, trials_before=300, level_n=0.08 * 10 ** (3 / 20))
@@ -192,14 +192,14 @@ def test_a_drift_raises_the_detection_threshold_too():
 
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_a_catch_trial_is_answered_as_any_other_trial_at_its_level(name):
-    observer = observer_named(name, 1)
+    observer = find_observer(name, 1)
     felt = trials(level_n=3.0)[:200]
     caught = [observer.reply(replace(each, phase=Phase.CATCH), 1) for each in felt]
     assert caught == [observer.reply(each, 1) for each in felt]
 
 
 def test_the_scripted_observer_looks_at_run_and_trial_alone():
-    scripted = observer_named("scripted", 0)
+    scripted = find_observer("scripted", 0)
 
     def right(direction: int, attempt: int, level_n: float, seed: int) -> list[bool]:
         felt = [
@@ -216,15 +216,15 @@ def test_the_scripted_observer_looks_at_run_and_trial_alone():
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_the_same_trial_gets_the_same_reply_in_any_order_of_asking(name):
     felt = trials()[:200]
-    forward = [observer_named(name, 5).reply(each, 5) for each in felt]
-    backward = [observer_named(name, 5).reply(each, 5) for each in reversed(felt)]
+    forward = [find_observer(name, 5).reply(each, 5) for each in felt]
+    backward = [find_observer(name, 5).reply(each, 5) for each in reversed(felt)]
     assert forward == backward[::-1]
     assert all(reply.answer in (1, 2) for reply in forward)
 
 
 @pytest.mark.parametrize("change", [{"run": 1}, {"attempt": 1}])
 def test_another_key_is_other_luck(change):
-    guesser = observer_named("guesser", 0)
+    guesser = find_observer("guesser", 0)
     here = [guesser.reply(trial, 1).answer for trial in trials()[:200]]
     there = [guesser.reply(replace(trial, **change), 1).answer for trial in trials()[:200]]
     assert abs(np.corrcoef(here, there)[0, 1]) < 4 / np.sqrt(200)
@@ -232,7 +232,7 @@ def test_another_key_is_other_luck(change):
 
 
 def test_response_times_are_those_of_people_and_say_nothing_about_the_answer():
-    replies = [observer_named("guesser", 0).reply(trial, 1) for trial in trials()]
+    replies = [find_observer("guesser", 0).reply(trial, 1) for trial in trials()]
     times_s = np.array([reply.response_time_s for reply in replies])
     assert np.mean((times_s > 1.2) & (times_s < 2.5)) == pytest.approx(0.95, abs=0.015)
     assert np.median(times_s) == pytest.approx(3**0.5, abs=0.03)
@@ -241,21 +241,21 @@ def test_response_times_are_those_of_people_and_say_nothing_about_the_answer():
 
 @pytest.mark.parametrize("name", OBSERVERS)
 def test_every_listed_name_is_an_observer(name):
-    assert observer_named(name, 3).name == ("person_1_seed_3" if name == "person" else name)
+    assert find_observer(name, 3).name == ("person_1_seed_3" if name == "person" else name)
 
 
 def test_a_hyphen_does_for_an_underscore():
-    assert observer_named("vibration-only", 0) == observer_named("vibration_only", 0)
+    assert find_observer("vibration-only", 0) == find_observer("vibration_only", 0)
 
 
 def test_an_unknown_name_is_refused_with_the_names_there_are():
     with pytest.raises(WrongUseError) as caught:
-        observer_named("gueser", 0)
+        find_observer("gueser", 0)
     assert caught.value.happened == "No observer is called gueser. Did you mean guesser?"
     assert caught.value.do_now == f"Choose one of {', '.join(OBSERVERS)}."
 
 
 def test_a_name_like_nothing_gets_no_guess():
     with pytest.raises(WrongUseError) as caught:
-        observer_named("xyz", 0)
+        find_observer("xyz", 0)
     assert caught.value.happened == "No observer is called xyz."

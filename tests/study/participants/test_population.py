@@ -13,7 +13,7 @@ from protocols.procedure.staircase import begin, is_finished, level_n, step, to_
 from protocols.trial import Phase
 from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.observer import Felt, Observer
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.participants.population import population
 
 FREQUENCIES = (5.0, 15.0, 25.0, 35.0, 45.0)
@@ -70,7 +70,7 @@ def test_a_study_of_ten_finds_the_rise_at_35_hz_significant(measured_n, study):
 
 def test_people_who_are_all_the_same_show_no_rise(protocol):
     """Negative control: guessers have one threshold at every frequency."""
-    guesser = observer_named("guesser", 0)
+    guesser = find_observer("guesser", 0)
     sittings = [sitting(protocol, guesser, seed) for seed in range(10)]
     groups = np.array([[found[frequency] for frequency in FREQUENCIES] for found in sittings]).T
     assert tukey_hsd(*groups).pvalue.min() > 0.05
@@ -116,8 +116,8 @@ def test_another_seed_is_other_people():
 def test_a_logged_name_calls_the_same_person_back():
     person = population(7, seed=12)[6]
     assert person.name == "person_7_seed_12"
-    assert observer_named(person.name, seed=99) == person
+    assert find_observer(person.name, seed=99) == person
 
 
 def test_every_scripted_run_ends(protocol):
-    assert set(sitting(protocol, observer_named("scripted", 0), seed=1)) == set(FREQUENCIES)
+    assert set(sitting(protocol, find_observer("scripted", 0), seed=1)) == set(FREQUENCIES)

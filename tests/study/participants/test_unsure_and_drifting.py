@@ -9,7 +9,7 @@ import pytest
 from protocols.trial import Phase
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.observer import Felt
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.participants.population import KINDS, member
 from study.participants.unsure import UnsureRepeater
 
@@ -46,7 +46,7 @@ def test_looks_together_tell_as_much_as_their_number_says(looks):
 
 
 def test_a_second_look_at_what_was_unsure_helps_and_the_sure_ask_for_none():
-    observer = observer_named("repeating", 0)
+    observer = find_observer("repeating", 0)
     first = [(felt, observer.reply(felt, 5)) for felt in trials()]
     answers = [
         (observer.reply(replace(felt, attempt=1), 5) if reply.ask_again else reply).answer == felt.direction_shown
@@ -57,7 +57,7 @@ def test_a_second_look_at_what_was_unsure_helps_and_the_sure_ask_for_none():
 
 
 def test_a_drifting_criterion_is_none_at_first_and_shows_later():
-    observer = observer_named("criterion_drift", 0)
+    observer = find_observer("criterion_drift", 0)
     early, late = ([observer.reply(felt, 5).answer for felt in trials(trials_before=n)] for n in (0, 300))
     assert np.mean(np.array(early) == 2) == pytest.approx(0.5, abs=four_errors(0.5))
     expected = (NORMAL.cdf(0.8195 + 0.9) + NORMAL.cdf(-0.8195 + 0.9)) / 2
@@ -67,7 +67,7 @@ def test_a_drifting_criterion_is_none_at_first_and_shows_later():
 @pytest.mark.parametrize(("rove_db", "expected"), [(0.0, 0.9331), (20.0, 0.575)])
 def test_who_goes_by_strength_is_thrown_off_by_a_roved_level(rove_db, expected):
     """3 dB between the directions: perfect but for the noise without roving, 50 + 50 d / r % at most with it."""
-    observer, random = observer_named("intensity_cue", 0), np.random.default_rng(4)
+    observer, random = find_observer("intensity_cue", 0), np.random.default_rng(4)
     roved = [
         replace(felt, nominal_n=2.0, level_n=2.0 * 10 ** (random.uniform(-0.5, 0.5) * rove_db / 20))
         for felt in trials()
@@ -78,7 +78,7 @@ def test_who_goes_by_strength_is_thrown_off_by_a_roved_level(rove_db, expected):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_member_can_be_made_again_from_its_name(kind):
-    assert observer_named(f"{kind}_2_seed_9", 0) == member(kind, 2, 9)
+    assert find_observer(f"{kind}_2_seed_9", 0) == member(kind, 2, 9)
     assert member(kind, 2, 9).name == f"{kind}_2_seed_9"
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.session.views.views import Answered, Reply, Unanswered
 from study.store.sessions.archive import SessionFolder
 from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
@@ -53,7 +53,7 @@ class Sitter:
 
     def participant(self, after: int | None = None, instead=None) -> Participant:
         clock = VirtualClock()
-        display = SimulatedDisplay(observer_named(self.observer, self.seed), self.seed, clock)
+        display = SimulatedDisplay(find_observer(self.observer, self.seed), self.seed, clock)
         shown = display if after is None else LeavesAfter(display, after, instead)
         return Participant(display=shown, hand=display, clock=clock)
 

@@ -19,6 +19,7 @@ from equalizer.signals.unit_system import UnitSystem
 _BEYOND = 0.25
 """Share of the visited range by which a formula is drawn beyond it, on either side."""
 _LINE_POINTS = 400
+"""Points of a drawn law."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

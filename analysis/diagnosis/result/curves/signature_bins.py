@@ -7,9 +7,11 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 _BINS, _LAW_BINS = 30, 120
+"""Bins of the missing force over a state, and of a drawn law."""
 _BLOCK_S = 0.5
 """Time between samples that count as independent."""
 _FEWEST = 20
+"""Fewest samples of a bin that is shown."""
 _RESTING = 0.01
 """Share of the range about the median that counts as rest when bins are chosen."""
 

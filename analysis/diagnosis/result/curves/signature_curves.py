@@ -52,6 +52,7 @@ ALONG: Mapping[str, Along] = {
 }
 """Variable of each effect's curve; for all other effects the spectrum of the residual is shown."""
 _FREQUENCY_LINES = 1024
+"""Lines of a spectrum that is drawn."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -109,8 +109,8 @@ def state_maps(
         else:
             series, completed, model = _of_evidence(evidence, axis), "", "the re-tuned model"
         if series is not None:
-            said = (letter, units[axis], model, completed)
-            found.append(_maps(series, said, length))
+            labels = (letter, units[axis], model, completed)
+            found.append(_maps(series, labels, length))
     first = diagnosis.effects[0].axis if diagnosis.effects else None
     return tuple(sorted(found, key=lambda each: (each.axis != first, -each.share)))
 
@@ -169,8 +169,8 @@ def _of_evidence(evidence: Sequence[Evidence], axis: int) -> _AxisSeries | None:
     return _AxisSeries(rate_hz, seconds, position, velocity, force, force + missing, None, used, parts)
 
 
-def _maps(series: _AxisSeries, said: tuple[str, str, str, str], length: str) -> StateMaps:
-    axis, unit, model, completed = said
+def _maps(series: _AxisSeries, labels: tuple[str, str, str, str], length: str) -> StateMaps:
+    axis, unit, model, completed = labels
     # As the missing force on the device: friction then points against the motion.
     missing = series.before - series.force
     left = None if series.after is None else series.after - series.force
@@ -190,14 +190,14 @@ def _maps(series: _AxisSeries, said: tuple[str, str, str, str], length: str) -> 
 
 
 def _view(
-    series: _AxisSeries, said: tuple[str, str], at: FloatArray, missing: tuple[FloatArray, FloatArray | None]
+    series: _AxisSeries, labels: tuple[str, str], at: FloatArray, missing: tuple[FloatArray, FloatArray | None]
 ) -> StateView:
     before, after = missing
     places = np.flatnonzero(series.used)
     shown = places[:: max(len(places) // CLOUD, 1)]
     where, mean, error = bin_means(at, before, series.used, series.rate_hz)
     left = np.zeros(0) if after is None else bin_means(at, after, series.used, series.rate_hz)[1]
-    return StateView(*said, at[shown], before[shown], where, mean, error, left)
+    return StateView(*labels, at[shown], before[shown], where, mean, error, left)
 
 
 def _loops(series: _AxisSeries, length: str) -> tuple[Loop, ...]:

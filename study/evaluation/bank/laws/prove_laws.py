@@ -9,11 +9,12 @@ from analysis.diagnosis.document import diagnosis_from_json
 from analysis.evaluation.laws.law_error import law_error
 from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
 from analysis.evaluation.laws.law_score import LawScore, law_score
+from study.errors import resumable
 from study.evaluation.bank.ask_engine import is_answered
 from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal_laws
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.seal_cases import BankPlan, read_case_names
-from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, resumable, reveal_bank
+from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, reveal_bank
 from study.store.disk.provenance import sha256_of
 
 LAWS = "laws"
@@ -33,7 +34,7 @@ class LawProof:
 def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawProof:
     """Run or continue a bank of laws in the folder `path`. Resumable. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief, LAWS)
-    with resumable(path):
+    with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
         names = read_case_names(folder, range(plan.cases))
         there = [name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()]
@@ -48,13 +49,13 @@ def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
     def is_whole(label: Mapping[str, Any]) -> bool:
         return sha256_of(fresh_file(folder, label["number"])) == str(label["fresh_sha256"])
 
-    def outcome_of(label: Mapping[str, Any], said: Mapping[str, Any]) -> LawOutcome:
-        return _outcome(label, said, fresh_file(folder, label["number"]))
+    def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> LawOutcome:
+        return _outcome(label, answer, fresh_file(folder, label["number"]))
 
     return reveal_bank(folder, cases, outcome_of, is_whole)
 
 
-def _outcome(label: Mapping[str, Any], said: Mapping[str, Any], fresh: Path) -> LawOutcome:
+def _outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh: Path) -> LawOutcome:
     truth = None if label["truth"] is None else _true_law(label["truth"])
     found = LawOutcome(
         number=label["number"],
@@ -64,9 +65,9 @@ def _outcome(label: Mapping[str, Any], said: Mapping[str, Any], fresh: Path) -> 
         axes=tuple(label["axes"]),
         truth=truth,
         adds=label["adds"],
-        said=None if "failed" in said else diagnosis_from_json(said["diagnosis"]),
-        channel_errors=said.get("channel_errors", {}),
-        seconds=said.get("cpu_seconds", float("nan")),
+        diagnosis=None if "failed" in answer else diagnosis_from_json(answer["diagnosis"]),
+        channel_errors=answer.get("channel_errors", {}),
+        seconds=answer.get("cpu_seconds", float("nan")),
     )
     if truth is None or not found.laws:
         return found

@@ -206,7 +206,7 @@ def applicable_injections(recording: Recording) -> tuple[str, ...]:
 
 
 def place_of(effect: str) -> Place:
-    """Where the fault acts: mechanism, actuator or sensor."""
+    """Place where the fault acts: mechanism, actuator or sensor."""
     forced = next((each for each in FORCE_INJECTIONS if each.effect == effect), None)
     return "sensor" if forced is None else "actuator" if forced.actuator else "mechanism"
 

@@ -88,9 +88,9 @@ def _build_change(
     change, (axis, other), (moved, command) = kind.change, places, free
     first, second, side, share = numbers
     assert change is not None
-    told = moved.acceleration if kind.acts_on == ("response",) else command
-    added = _rms(change(told[:, axis], told[:, other], first, second))
-    size = OF_SOFT if first > 0 else side * share * _rms(told[:, axis]) / added
+    argument = moved.acceleration if kind.acts_on == ("response",) else command
+    added = _rms(change(argument[:, axis], argument[:, other], first, second))
+    size = OF_SOFT if first > 0 else side * share * _rms(argument[:, axis]) / added
 
     def become(samples: FloatArray) -> FloatArray:
         changed = samples.copy()

@@ -45,13 +45,13 @@ class LawKind:
     memory: bool = False
     axes: int = 1
     both: bool = False
-    """It acts on the other axis as well."""
+    """Whether the law acts on the other axis as well."""
     change: Callable[[FloatArray, FloatArray, float, float], FloatArray] | None = None
     """For commands or readings: change for k = 1, from own axis, other axis, a and b."""
 
 
 def _either(random: Random, simple: tuple[float, ...], low: float, high: float) -> float:
-    """With equal probability one of the simple numbers, or any number in the range."""
+    """Draw, with equal probability, one of the simple numbers or any number in the range."""
     return float(random.choice(simple)) if random.random() < 0.5 else float(random.uniform(low, high))
 
 

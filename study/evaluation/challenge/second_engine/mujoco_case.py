@@ -33,7 +33,8 @@ Build = Callable[[MujocoBench, int, Values], MujocoBench]
 def draw_mujoco_case(
     seed: int, effects: Sequence[str], concealed: Concealed, strength: Sequence[float], name: str, rig: Rig
 ) -> Case:
-    """As `draw_case`. Raises ValueError for an effect that the engine cannot express."""
+    """Draw a case as `draw_case` does, moved by MuJoCo. Raises ValueError for an effect that the engine cannot
+    express."""
     if unknown := set(effects) - set(BUILDERS) - set(IN_THE_SENSOR):
         raise ValueError(f"the second engine cannot conceal {', '.join(sorted(unknown))}")
     random = np.random.default_rng([seed, len(effects), 2])
@@ -66,8 +67,8 @@ def draw_mujoco_case(
         further = further_plan(command, kind, rig)
         heavier = replace(device, mass_kg=device.mass_kg + added_kg)
         felt = simulate_motion(heavier, further.command)
-        seen = read(sensing.sensor, *felt, RATE_HZ, np.random.default_rng([seed, noise]))
-        return replace(make_recording(name, further, *seen, rig), meta=added_mass_meta(added_kg))
+        readings = read(sensing.sensor, *felt, RATE_HZ, np.random.default_rng([seed, noise]))
+        return replace(make_recording(name, further, *readings, rig), meta=added_mass_meta(added_kg))
 
     adds = visibility(Device(bench), sensing, (still, motion), rig) if effects else 0.0
     return Case(recording, as_model(name, known, tolerance, rig.axes), tuple(truth), again, adds)

@@ -24,7 +24,7 @@ def is_installed() -> bool:
 def draw_engine_case(
     seed: int, effects: Sequence[str], concealed: "Concealed", strength: Sequence[float], name: str, rig: Rig
 ) -> "Case":
-    """As `draw_case`, moved by the second engine. Raises ImportError where it is not installed."""
+    """Draw a case as `draw_case` does, moved by the second engine. Raises ImportError where it is not installed."""
     from study.evaluation.challenge.second_engine.mujoco_case import draw_mujoco_case
 
     return draw_mujoco_case(seed, effects, concealed, strength, name, rig)

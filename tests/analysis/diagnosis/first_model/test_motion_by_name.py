@@ -1,4 +1,4 @@
-"""A response in no unit is what its name says, where that is clear; else what its course suggests."""
+"""A response in no unit is what its name says, where that is clear; else what its time series suggests."""
 
 import numpy as np
 import pytest

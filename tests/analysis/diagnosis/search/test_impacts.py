@@ -88,7 +88,7 @@ def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sa
     assert np.std(courses[0][0] - courses[1][0], axis=0)[AXIS] > 10
 
 
-def test_what_is_left_is_reported_by_channel_and_not_by_the_course_of_blows(loose, told):
+def test_what_is_left_is_reported_by_channel_and_not_by_the_sequence_of_impacts(loose, told):
     assert impact_remainder(loose[0].whole, told) == ()
     further = replace(told, after=replace(told.after, score=FitScore(*np.array([[1, 4, 1, 1.0]] * 3))))
     (left,) = impact_remainder(loose[0].whole, further)
@@ -125,7 +125,7 @@ def test_the_whole_diagnosis_says_what_was_compared(diagnosed):
     assert found.diagnosis.fit.test.after < 0.4 * found.diagnosis.fit.test.retuned
     assert diagnosis_from_json(diagnosis_to_json(found.diagnosis)) == found.diagnosis
     lines = " ".join(summary_lines(found))
-    assert "Its blows cannot be predicted one by one" in lines
+    assert "Its impacts cannot be predicted one by one" in lines
     assert "the power of each channel in each half octave" in lines
 
 

@@ -10,7 +10,7 @@ from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Concealed, Outcome
 from analysis.evaluation.proof.score import is_miss, score
 from analysis.evaluation.proof.share import pooled_share, share, statistic
-from analysis.evaluation.proof.wording import concealed_text, figure_text, said_text
+from analysis.evaluation.proof.wording import answer_text, concealed_text, figure_text
 from analysis.figures.proof_pictures import proof_pictures
 from analysis.reports.proof_report import ProofFacts, render_proof_report
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -47,7 +47,7 @@ def outcome(kind="single", concealed=("coulomb_friction",), answer=None, bank="m
         "adds": 3.0,
         "seconds": 4.0,
     }
-    return Outcome(kind=kind, bank=bank, concealed=hidden, said=answer, channel_errors=found, **(fixed | more))
+    return Outcome(kind=kind, bank=bank, concealed=hidden, diagnosis=answer, channel_errors=found, **(fixed | more))
 
 
 RIGHT = outcome(answer=said("explained", named("coulomb_friction")))
@@ -189,5 +189,5 @@ def test_a_bank_of_nothing_has_no_pictures():
 
 def test_sentences_say_truth_and_answer():
     assert concealed_text(PAIR) == "coulomb_friction of x + viscous_damping of x"
-    assert said_text(WRONG) == "explained: viscous_damping of x (0.60)"
+    assert answer_text(WRONG) == "explained: viscous_damping of x (0.60)"
     assert concealed_text(CLEAN) == "nothing"

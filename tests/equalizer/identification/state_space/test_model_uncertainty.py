@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.state_space.identify import identify, response_deviation
+from equalizer.identification.state_space.bootstrap import response_deviation
+from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.model_response import model_response
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, UserInterruptError
 from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.bank.proof_summary import proof_lines, summary
@@ -81,7 +81,7 @@ def test_the_process_that_answers_never_loads_the_challenge(proof):
 )
 def test_the_process_that_answers_reaches_no_label(proof, does, refused):
     script = (
-        "from pathlib import Path\nfrom study.evaluation.bank.answer_cases import stay_apart\n"
+        "from pathlib import Path\nfrom study.evaluation.bank.answer_cases import isolate_process\n"
         f"cases = Path({str(proof[0].folder.open)!r})\nstay_apart(cases)\n{does}"
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
@@ -187,7 +187,7 @@ def test_ctrl_c_keeps_what_is_sealed(tmp_path):
         if what == "diagnosing":
             raise KeyboardInterrupt
 
-    with pytest.raises(LeftError, match="Interrupted"):
+    with pytest.raises(UserInterruptError, match="Interrupted"):
         prove(tmp_path / "bank", BankPlan(SEED, 1, brief=True), BankOptions(workers=1), interrupt)
     assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(drawable_cases(BankPlan(SEED, 1, brief=True)))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, UserInterruptError
 from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, answer_sent_recording, diagnose_folder
 from study.evaluation.real.real_summary import real_lines
@@ -148,7 +148,7 @@ def test_interrupted_the_same_command_continues(folder: Path, tmp_path: Path) ->
         if what.startswith("torn"):
             raise KeyboardInterrupt
 
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         diagnose_folder(RealPlan(folder, tmp_path / "out", seconds=1.0), leave)
     assert "goes on where it stopped" in left.value.do_now
     assert (tmp_path / "out" / "axis" / "run" / "answer.json").is_file()

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.evaluation.reproduction.document import ReproductionError, reproduction_from_json
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, UserInterruptError
 from study.evaluation.reproduction.reproduce_paper import identify_or_load, reproduce_paper
 from study.evaluation.reproduction.reproduce_recordings import RecordingRequest, record_or_load
 from study.evaluation.reproduction.reproduction_plan import ReproducedProtocols, ReproductionPlan, Steps
@@ -164,7 +164,7 @@ def test_interrupted_it_says_that_the_same_command_continues(plan, tmp_path):
     def stop(share: float) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(LeftError, match="Run the same command again"):
+    with pytest.raises(UserInterruptError, match="Run the same command again"):
         reproduce_paper(stopped, stop)
 
 

@@ -38,8 +38,8 @@ def engine(tmp_path, monkeypatch):
     clients = []
 
     def start(function: str) -> tuple[EngineClient, queue.Queue]:
-        def strange(module, name, *, said):
-            return start_child("strange_engines", function, said=said)
+        def strange(module, name, *, output):
+            return start_child("strange_engines", function, output=output)
 
         monkeypatch.setattr("study.tui.engine.client.start_child", strange)
         heard = queue.Queue()
@@ -73,7 +73,7 @@ def test_the_last_words_of_an_engine_are_reported(engine):
 
 
 def test_a_system_that_starts_nothing_is_reported(monkeypatch):
-    def refuse(*arguments, said):
+    def refuse(*arguments, output):
         raise OSError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr("study.tui.engine.client.start_child", refuse)

@@ -11,7 +11,7 @@ from analysis.device_change.compare_devices import Change
 from study.cli.main import main
 from study.devices.force_dimension.acceptance import Acceptance, acceptance_file, write_acceptance
 from study.devices.opening import device_folder
-from study.errors import DeviceError, LeftError
+from study.errors import DeviceError, UserInterruptError
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.daily_check import Moving, check_on, compare_recordings, last_check
@@ -133,7 +133,7 @@ def test_it_is_announced_and_a_no_keeps_the_device_still(two_days, device_like, 
         raise KeyboardInterrupt
 
     stepped_stub.set("peak_n", 0)
-    with device_like(2, {}) as (device, plan), pytest.raises(LeftError):
+    with device_like(2, {}) as (device, plan), pytest.raises(UserInterruptError):
         check_on(device, plan, Moving(no, lambda done: None))
     assert stepped_stub.get("peak_n") == 0
 

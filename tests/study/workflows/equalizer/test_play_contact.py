@@ -11,7 +11,7 @@ from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, TRANSIENT, Trajectory
 from study.cli.main import main
 from study.devices.device import Fault
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, UserInterruptError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer import play_contact as play_contact_module
@@ -132,7 +132,7 @@ def refuse_after(said):
 def test_a_real_device_is_announced_and_does_not_move_for_a_person_who_says_no(folder, tmp_path):
     said = []
     plan = ContactPlan(folder / "model.h5", folder / "tap.csv", NORMAL, tmp_path / "out")
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         play_contact(plan, lambda _: None, refuse_after(said))
     assert "0 of 2 plays were measured" in left.value.happened
     assert "No person may hold the handle: 'omega.3' is going to move by itself" in said[0]
@@ -153,7 +153,7 @@ def test_repeats_on_a_real_device_are_announced_first(folder, tmp_path):
     order, said = RepeatOrder(repeats=1, device="omega3"), []
     with pytest.raises(StudyError, match="without a warning"):
         repeat_trajectory(plan, order, lambda *_: None)
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         repeat_trajectory(plan, order, lambda *_: None, refuse_after(said))
     assert "0 of up to 2 plays" in left.value.happened
     assert "No person may hold the handle" in said[0]

@@ -19,7 +19,7 @@ from protocols.definition.apparatus import SafetySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import SweepSegment
 from study.devices.device import DeviceSettings
-from study.errors import DeviceError, LeftError, StudyError
+from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.recording_file import read_recording
@@ -144,7 +144,7 @@ def test_interrupted_the_best_so_far_is_kept_and_said(plan, tmp_path):
             raise KeyboardInterrupt
 
     out = tmp_path / "forces.csv"
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         repeat_playback(replace(plan, out=out), press)
     assert left.value.happened.startswith("3 of up to 11 plays were measured")
     assert left.value.saved == f"The best forces of 3 plays are in {out}."
@@ -158,7 +158,7 @@ def test_interrupted_in_the_first_play_nothing_is_written(plan, tmp_path):
     def press(play: int, share: float) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         repeat_playback(replace(plan, out=tmp_path / "forces.csv"), press)
     assert left.value.saved == "Nothing was written."
     assert list(tmp_path.iterdir()) == []

@@ -10,7 +10,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.trajectory import Trajectory
-from study.errors import DeviceError, LeftError, StudyError
+from study.errors import DeviceError, StudyError, UserInterruptError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.repeats_file import read_repeats, repeats_path
@@ -110,7 +110,7 @@ def test_interrupted_the_best_so_far_is_written(plan):
         if play == 2:
             raise KeyboardInterrupt
 
-    with pytest.raises(LeftError) as caught:
+    with pytest.raises(UserInterruptError) as caught:
         repeat_trajectory(plan, ORDER, leave)
     assert f"in {plan.out}" in caught.value.saved
     assert read_repeats(repeats_path(plan.out)).interrupted

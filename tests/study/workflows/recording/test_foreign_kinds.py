@@ -1,4 +1,4 @@
-"""Workbooks and JSON of strangers go in wherever a recording is read."""
+"""Workbooks and JSON of other programs go in wherever a recording is read."""
 
 import json
 

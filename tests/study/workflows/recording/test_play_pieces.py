@@ -13,7 +13,7 @@ from protocols.definition.recording_segments import MultisineSegment, SweepSegme
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.devices.safe import SafeDevice
-from study.errors import DeviceError, LeftError, StudyError
+from study.errors import DeviceError, StudyError, UserInterruptError
 from study.store.formats.recording_file import read_recording
 from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 from study.workflows.recording.play_pieces import MOST_TRIES
@@ -138,7 +138,7 @@ def test_interrupted_in_a_second_try_the_pieces_before_are_kept(tmp_path, device
         seen.append(seconds)
 
     y_first = replace(PROTOCOL, segments=(replace(SWEEP, along="y"), SWEEP))
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         record_on(device_that_clips_at(5.0), plan(tmp_path / "r.h5", y_first), press)
     assert left.value.happened.startswith("1 of 2 pieces")
     recording = read_recording(tmp_path / "r.h5")
@@ -176,7 +176,7 @@ def test_a_real_device_does_not_move_after_the_answer_no(tmp_path, device_that_c
         raise KeyboardInterrupt
 
     device = device_that_clips_at(1e3, simulated=False)
-    with pytest.raises(LeftError, match="0 of 2 pieces were recorded"):
+    with pytest.raises(UserInterruptError, match="0 of 2 pieces were recorded"):
         record_on(device, plan(tmp_path / "r.h5"), lambda _: None, no)
     assert device.look().position_m == (0.0, 0.0, 0.0)
     assert list(tmp_path.iterdir()) == []

@@ -6,7 +6,7 @@ import pytest
 from protocols.definition.apparatus import SafetySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import SineSegment, SweepSegment
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, UserInterruptError
 from study.store.formats.recording_file import read_recording
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
@@ -55,7 +55,7 @@ def test_interrupted_the_whole_pieces_are_written(tmp_path):
         if seconds > 3.5:
             raise KeyboardInterrupt
 
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         record_device(plan(tmp_path / "r.h5"), press)
     assert left.value.happened.startswith("1 of 3 pieces were recorded")
     recording = read_recording(tmp_path / "r.h5")
@@ -67,7 +67,7 @@ def test_interrupted_at_once_nothing_is_written(tmp_path):
     def press(seconds: float) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         record_device(plan(tmp_path / "r.h5"), press)
     assert left.value.saved == "Nothing was written."
     assert list(tmp_path.iterdir()) == []

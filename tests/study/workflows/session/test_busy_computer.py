@@ -2,7 +2,7 @@
 
 import pytest
 
-from study.errors import LeftError
+from study.errors import UserInterruptError
 from study.session.facts.events import NoteTaken, TrialSpoiled
 from study.session.facts.void_reasons import SCREEN_LATE
 from study.session.views.views import Unanswered
@@ -71,7 +71,7 @@ def test_three_in_a_row_end_the_sitting_in_words_that_fit(late_at):
         "the computer is too busy: 3 trials in a row were void because of it, not because of the participant "
         f"(the last because {SCREEN_LATE})"
     )
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         end_sitting(end, UTC)
     assert left.value.do_now.startswith("Close other programs, and measure with hapteq doctor whether that helps.")
     assert left.value.do_now.endswith(f"Go on with: hapteq resume {end.folder.path}")

@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 import pytest
 
 from study.devices.clock import VirtualClock
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.session.facts.events import NoteTaken, SessionResumed
 from study.session.state.sitting_state import dose_now
 from study.session.views.views import Unanswered
@@ -56,7 +56,7 @@ class Answers:
 def at(sitter):
     def participant(start: datetime, **what) -> Participant:
         clock = SetClock(start)
-        quiet = SimulatedDisplay(observer_named(sitter.observer, sitter.seed), sitter.seed, clock)
+        quiet = SimulatedDisplay(find_observer(sitter.observer, sitter.seed), sitter.seed, clock)
         return Participant(display=Answers(quiet, clock, **what), hand=quiet, clock=clock)
 
     return participant

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from protocols.trial import Phase, TrialStatus
-from study.errors import DeviceError, LeftError, StudyError
+from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.events import TrialMeasured, TrialPresented, TrialSpoiled
 from study.session.views.views import Unanswered
 from study.store.formats.recording_file import read_recording
@@ -223,7 +223,7 @@ def test_ctrl_c_leaves_a_log_that_can_be_resumed(sitter):
     def press() -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         sitter.interrupted(after=4, instead=press)
     assert left.value.saved == "4 answers are on disk."
     assert left.value.do_now.startswith("Go on with: hapteq resume ")

@@ -3,7 +3,7 @@
 import pytest
 
 from study.devices.clock import VirtualClock
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.session.facts.events import NoteTaken, PauseTaken, SessionInterrupted
 from study.session.views.views import AfterPause, Unanswered
 from study.session.watching.requests import NoteAsked
@@ -38,7 +38,7 @@ class PausesOnce:
 @pytest.mark.parametrize("decision", AfterPause)
 def test_notes_and_adverse_events_are_in_the_log_however_the_pause_ends(sitter, decision):
     clock, requests = VirtualClock(), QueuedRequests()
-    display = SimulatedDisplay(observer_named("scripted", 11), 11, clock)
+    display = SimulatedDisplay(find_observer("scripted", 11), 11, clock)
     participant = Participant(PausesOnce(display, decision, requests), display, clock, requests)
     conducted = conduct_new(sitter.plan(), "simulated", participant)
     events = read_log(conducted.folder.log).events

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from study.devices.device import Fault, Health, Played
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, UserInterruptError
 from study.session.views.views import Unanswered
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import EventLog, read_log
@@ -173,7 +173,7 @@ def test_ctrl_c_at_any_line_leaves_a_session_that_can_be_resumed(sitter, monkeyp
             raise KeyboardInterrupt
 
     monkeypatch.setattr(EventLog, "append", press)
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         sitter.whole()
     from study.store.sessions.archive import find_session
 

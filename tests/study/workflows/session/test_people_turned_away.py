@@ -12,7 +12,7 @@ from protocols.document.dumping import dump_protocol
 from protocols.procedure.schedule import williams_rows
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.session.facts.events import FormFilled, PlaceTaken, SessionClosed, SessionInterrupted, SessionOpened
 from study.session.views.archive_views import TURNED_AWAY
 from study.session.views.form_views import FormKind, FormReply
@@ -47,7 +47,7 @@ class Visitor(SimulatedDisplay):
     """Called before the first form."""
 
     def __init__(self, script: dict[FormKind, str], clock: VirtualClock) -> None:
-        super().__init__(observer_named("ideal", 1), 1, clock)
+        super().__init__(find_observer("ideal", 1), 1, clock)
         self.script, self.forms, self.goodbyes = script, [], []
 
     def fill_in(self, form):

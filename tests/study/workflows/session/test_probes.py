@@ -8,7 +8,7 @@ import pytest
 from protocols.definition.probes import ProbeSettings
 from protocols.document.dumping import dump_protocol
 from study.devices.safe import SafeDevice
-from study.errors import LeftError
+from study.errors import UserInterruptError
 from study.session.facts.events import (
     PauseTaken,
     ProbeMeasured,
@@ -164,7 +164,7 @@ def test_a_program_that_ends_within_a_probe_repeats_and_loses_none(probed, monke
         return show(self, notice, sign_of_life)
 
     monkeypatch.setattr(SimulatedDisplay, "show_playing", ends_within_the_fourth)
-    with pytest.raises(LeftError):
+    with pytest.raises(UserInterruptError):
         probed.whole()
     (folder,) = (f for f in probed.data.iterdir() if f.is_dir())
     from study.store.sessions.archive import SessionFolder

@@ -8,7 +8,7 @@ import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
 from protocols.document.loading import load_protocol
-from study.errors import LeftError, StudyError
+from study.errors import StudyError, UserInterruptError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.sessions.archive import session_folders
 from study.store.sessions.event_log import read_log
@@ -60,7 +60,7 @@ class Interrupted(Executor):
 
 
 def test_an_interruption_promises_only_what_workers_elsewhere_have_finished(rehearsal):
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         rehearse_study(rehearsal, Interrupted(), lambda done: None)
     assert left.value.saved == f"All sessions finished so far are in {rehearsal.data}."
 

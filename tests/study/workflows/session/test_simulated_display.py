@@ -6,7 +6,7 @@ import pytest
 
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.session.state.due_trial import Present
 from study.session.views.form_views import Form, FormField, FormKind
 from study.session.views.views import Answered, DirectionPicture, HandleView, Question, RestNotice, Task, Unanswered
@@ -18,7 +18,7 @@ PICTURE = DirectionPicture("yz", (135.0, 45.0))
 class Seated:
     def __init__(self, observer: str = "ideal") -> None:
         self.clock = VirtualClock()
-        self.display = SimulatedDisplay(observer_named(observer, 3), 3, self.clock)
+        self.display = SimulatedDisplay(find_observer(observer, 3), 3, self.clock)
 
     def right(self, phase: Phase, frequency_hz: float, level_n: float, trials: int = 200) -> float:
         """Share of right answers among so many trials whose right answer alternates in pairs."""

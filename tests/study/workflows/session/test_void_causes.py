@@ -6,7 +6,7 @@ import pytest
 
 from protocols.trial import VoidCause
 from study.devices.device import Fault
-from study.errors import LeftError
+from study.errors import UserInterruptError
 from study.session.state.rules import LATEST
 from study.session.views.views import Unanswered
 from study.store.formats.trials_file import TRIALS_NAME, read_trials
@@ -103,7 +103,7 @@ def test_ctrl_c_counts_as_leaving_and_a_dead_program_does_not(sitter):
     def interrupt():
         raise KeyboardInterrupt
 
-    with pytest.raises(LeftError):
+    with pytest.raises(UserInterruptError):
         conduct_new(sitter.plan("P01"), "simulated", sitter.participant(3, interrupt))
     done = sitter.resumed(SessionFolder(sitter.data / "P01_001"))
     assert [t.void_cause for t in done.state.trials if t.void_cause] == [VoidCause.LEFT]

@@ -62,5 +62,5 @@ def test_no_law_is_named_that_is_not_there(tmp_path):
     write_laws(proof)
     assert json.loads((proof.folder.path / "proof.json").read_text())["of"] == "laws"
     assert next(law_lines(proof)).endswith("misses in 20 cases")
-    assert [each.number for each in proof.outcomes if each.said is None] == []
+    assert [each.number for each in proof.outcomes if each.diagnosis is None] == []
     assert [each.number for each in proof.outcomes if each.false_law or each.wrongly_explained] == []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.choose_measure import measure_of
-from study.errors import LeftError, WrongUseError
+from study.errors import UserInterruptError, WrongUseError
 from study.store.formats.recording_file import write_recording
 from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
 from study.workflows.diagnosis.diagnose_recordings import diagnose_recordings
@@ -50,7 +50,7 @@ def test_at_the_screen_a_stop_is_reported_and_leaves_nothing(files, tmp_path):
     def stop(what, share):
         raise KeyboardInterrupt
 
-    with pytest.raises(LeftError) as left:
+    with pytest.raises(UserInterruptError) as left:
         diagnose_at_screen(plan(files, tmp_path / "out"), stop)
     assert (left.value.title, left.value.saved) == ("The diagnosis was stopped", "Nothing was written.")
     assert list(tmp_path.iterdir()) == []

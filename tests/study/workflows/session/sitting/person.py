@@ -1,6 +1,6 @@
 """A person at the screen, played by a simulated participant; and the events of a log."""
 
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.session.views.form_views import FormKind, FormReply
 from study.session.views.views import AfterPause, DemoDone, PlayDemo
 from study.store.sessions.event_log import read_log
@@ -11,7 +11,7 @@ class Person(SimulatedDisplay):
     """Answers like a simulated participant, and does what a test wants at each other call."""
 
     def __init__(self, clock, seed=11):
-        super().__init__(observer_named("ideal", seed), seed, clock)
+        super().__init__(find_observer("ideal", seed), seed, clock)
         self.calls, self.questions, self.playing, self.told = [], [], [], []
         self.at_question = lambda question: None
         self.at_pause = lambda: None

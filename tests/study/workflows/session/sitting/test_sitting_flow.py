@@ -7,7 +7,7 @@ import pytest
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
-from study.participants.observers import observer_named
+from study.participants.observers import find_observer
 from study.session.facts.events import (
     DemoPlayed,
     DeviceChecked,
@@ -96,7 +96,7 @@ def test_the_same_seed_and_answers_give_the_same_trials_for_any_participant(plan
     """A person with forms and checks, and a simulated participant without: equal draws, equal levels."""
     person = conduct_new(plan(small_protocol), "simulated", seat)
     clock = VirtualClock()
-    display = SimulatedDisplay(observer_named("ideal", 11), 11, clock)
+    display = SimulatedDisplay(find_observer("ideal", 11), 11, clock)
     simulated = replace(plan(small_protocol), observer="ideal", subject="S1")
     headless = conduct_new(simulated, "simulated", Participant(display=display, hand=display, clock=clock))
     drawn = [(t.run, t.trial, t.phase, t.frequency_hz, t.level_n, t.direction_shown) for t in person.state.trials]

@@ -93,7 +93,7 @@ def test_what_was_made_from_others_alone_stays(data):
     (data / ".found.89abcdef.part" / "diagnosis.json").write_text('{"recordings": ["P01_002"]}')
     others = files(data / "analysis")
     plan = plan_withdrawal(SessionFolder(data / "P01_001"))
-    assert plan.made_from_them == (".found.89abcdef.part", "with_p01")
+    assert plan.derived_roots == (".found.89abcdef.part", "with_p01")
     assert plan.doubtful == (f"{PART} does not say whose numbers it holds.",)
     withdraw(data, plan, UTC)
     assert files(data / "analysis") == others

@@ -9,8 +9,8 @@ from textual.screen import Screen
 
 import study.tui
 from study.session.views.views import DemoMenu, PlayDemo, picture_of
+from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.demo import DemoScreen
-from study.tui.take_off import take_off
 
 
 def test_what_is_taken_off_twice_leaves_the_screen_below_and_replies_once():
@@ -20,8 +20,8 @@ def test_what_is_taken_off_twice_leaves_the_screen_below_and_replies_once():
             below, above = Screen(), Screen()
             await app.push_screen(below)
             await app.push_screen(above, replies.append)
-            take_off(above, 1)
-            take_off(above, 2)
+            dismiss_screen(above, 1)
+            dismiss_screen(above, 2)
             await pilot.pause()
             assert app.screen is below
             assert replies == [1]
@@ -48,4 +48,4 @@ def test_a_burst_of_keys_plays_one_demonstration(small_protocol):
 
 def test_every_screen_leaves_this_way():
     sources = Path(study.tui.__file__).parent.rglob("*.py")
-    assert [path.name for path in sources if ".dismiss(" in path.read_text()] == ["take_off.py"]
+    assert [path.name for path in sources if ".dismiss(" in path.read_text()] == ["dismiss_screen.py"]

@@ -9,7 +9,7 @@ from textual.screen import Screen
 Reply = TypeVar("Reply")
 
 
-def take_off(screen: Screen[Reply], reply: Reply) -> None:
+def dismiss_screen(screen: Screen[Reply], reply: Reply) -> None:
     """Dismiss the screen if it is on top. Of two keys that arrive together, both are handled by the first key's
     screen: with the second, Textual would remove the screen below, or end the program."""
     if screen.is_active:
