@@ -146,10 +146,14 @@ class Explanation:
 
 
 def explain(
-    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget = always
+    context: SearchContext,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget = always,
+    begun: Sequence[FittedCandidate] = (),
 ) -> Explanation:
     """Re-tunes the model and adds effects one by one. time_left: asked before each piece of the search; what was found
-    when it says no is kept."""
+    when it says no is kept. begun: the steps of a search on fewer samples, which this one goes on from."""
     before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
     retuned = _retune(context, before)
@@ -164,15 +168,19 @@ def explain(
         base = _add_certain(context, base, certain)
         rounds.append((base,))
         steps.append(base)
+    for step in begun:
+        base = _refit(context, step)
+        rounds.append((base,))
+        steps.append(base)
     more = SEARCH_ON * (1.0 if context.references is None else context.references.beyond)
     while (
         not context.certain
         and len(rounds) < MOST_EFFECTS
         and (base.score.worst_channel > (more if rounds else NOISE_ALONE) or (surprised and not rounds))
     ):
-        step = Step(f"looking for the {_ORDINALS[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
+        shown = Step(f"looking for the {_ORDINALS[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         try:
-            tried = find_next_effect(within_time, catalogue, base.fitted, step)
+            tried = find_next_effect(within_time, catalogue, base.fitted, shown)
         except OutOfTimeError:
             ended_early = True
             break
@@ -185,6 +193,11 @@ def explain(
         steps.append(base)
     ends = (context.with_test_score(context.candidate(before)), confirmed, context.with_test_score(base))
     return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
+
+
+def _refit(context: SearchContext, step: FittedCandidate) -> FittedCandidate:
+    start = evaluate_fit(context.measure, context.tuning, step.fitted.deviations, step.fitted.hypothesis)
+    return context.candidate(refine(context, start))
 
 
 def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:

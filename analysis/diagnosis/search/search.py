@@ -176,7 +176,11 @@ def _find_with_opened(
     where the others show the mismatch, else the first half of each."""
     milder = first.context.open_milder(left)
     context = first.context.open_half() if milder is None else milder
-    found = _explain_and_prune(context, catalogue, progress, time_left)
+    begun = first.found.steps if left is first.found.after and as_good_as_noise(first.found) else ()
+    found = _explain_and_prune(context, catalogue, progress, time_left, begun)
+    if begun and not as_good_as_noise(found) and time_left():
+        anew = _explain_and_prune(context, catalogue, progress, time_left)
+        found = min(found, anew, key=lambda each: each.after.score.mean_log_error)
     used = TEST_HALF_USED if milder is None else MILDER_TEST_USED
     return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
 
@@ -202,10 +206,15 @@ def _sites(candidate: FittedCandidate) -> set[tuple[str, int]]:
 
 
 def _explain_and_prune(
-    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+    context: SearchContext,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget,
+    begun: Sequence[FittedCandidate] = (),
 ) -> Explanation:
-    """Forward selection, exchange and backward elimination; where the last two crash, nothing is named."""
-    found = explain(context, catalogue, progress, time_left)
+    """Forward selection, exchange and backward elimination; where the last two crash, nothing is named. begun: as for
+    `explain`."""
+    found = explain(context, catalogue, progress, time_left, begun)
     nothing = replace(found, after=found.retuned, steps=())
     newest = found.steps[-1].newest if found.steps else ""
 
