@@ -32,6 +32,11 @@ BLOCK_S = 0.05
 
 VIRTUAL_BLOCK_S = 5.0
 
+NOT_CLOSED = (
+    "the device did not answer when it was closed: it got zero force, and its brakes may be off; what was measured is "
+    "saved; switch it off before a hand touches the handle, and on again before the next session"
+)
+
 PATIENCE_S = 1.0
 """Beyond all fades, before a device that does not become still counts as lost."""
 
@@ -150,10 +155,11 @@ class SafeDevice:
         # Last, so that a close that was interrupted is made good for when the program ends.
         self._closed = True
         atexit.unregister(self._close_at_exit)
-        if not self._runner.force_off:
+        if not (self._runner.force_off and self._runner.disconnected):
             # Closing never raises and may be the last thing a program does: the person at the handle must hear it.
+            said = NOT_CLOSED if self._runner.force_off else Fault.FORCE_LEFT.value
             with contextlib.suppress(OSError):
-                sys.stderr.writelines([f"{Fault.FORCE_LEFT.value}\n"])
+                sys.stderr.writelines([f"{said}\n"])
 
     def _close_at_exit(self) -> None:
         """The program's last chance: it ignores Ctrl-C, for the interpreter stops all threads next, the one that writes

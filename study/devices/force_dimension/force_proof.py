@@ -81,9 +81,9 @@ def prove_cap_holds(device: Capped, rig: Telling) -> float:
     device.hold_unchecked(shaking)
     of_ticks_n = _most_given_n(device, rig)
     device.release()
+    _check_given("at each tick", of_ticks_n)
     if device.fault() is not Fault.NONE:
         raise _not_accepted_error(f"The force did not last: {device.fault().value}.")
-    _check_given("at each tick", of_ticks_n)
     of_library_n = rig.given_past_this_n(ASKED_SHARE * FORCE_N)
     _check_given("of the library", of_library_n)
     return max(of_ticks_n, of_library_n)
