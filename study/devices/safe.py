@@ -101,7 +101,13 @@ class SafeDevice:
         return Fault.STOPPED if self._governor.stop_asked and fault is not Fault.FORCE_LEFT else fault
 
     def health(self) -> Health:
-        return replace(self._governor.health(), fault=self.fault())
+        return self._told(replace(self._governor.health(), fault=self.fault()))
+
+    def _told(self, health: Health) -> Health:
+        failure = self._runner.failure
+        if failure is None:
+            return health
+        return replace(health, why=failure.happened.rstrip(".") if isinstance(failure, DeviceError) else str(failure))
 
     def release(self) -> Played:
         stimulus = self._held
@@ -110,7 +116,8 @@ class SafeDevice:
         self._governor.ask_release()
         self._wait_until_still(stimulus.fade_out_s)
         self._held = None
-        return record_held_stimulus(self._governor, self._info, self._apart)
+        played = record_held_stimulus(self._governor, self._info, self._apart)
+        return replace(played, health=self._told(played.health))
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
         self._must_be_idle()
