@@ -42,7 +42,7 @@ DIMENSIONS = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3)"
 def read_calibration(path: Path) -> LinkageCalibration:
     """Raises CannotReadError, or UnusableFileError with all problems."""
     problems = Problems()
-    with open_hdf5(path, KIND, FORMAT, VERSION) as file:
+    with open_hdf5(path, KIND, FORMAT, VERSION, sealed=True) as file:
         parts = _parts(file, problems)
     if problems.found:
         raise UnusableFileError(path, KIND, tuple(problems.found))
@@ -63,7 +63,7 @@ def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
             file.create_dataset(name, data=getattr(calibration, name), fletcher32=True)
         file.attrs["provenance"] = json.dumps(dict(calibration.provenance), allow_nan=False)
 
-    write_hdf5(path, fill, overwrite=False)
+    write_hdf5(path, fill, overwrite=False, sealed=True)
 
 
 def _parts(file: Any, problems: Problems) -> dict[str, Any]:

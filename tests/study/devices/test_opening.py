@@ -204,7 +204,7 @@ def test_a_driver_that_cannot_show_its_force_is_not_accepted(own):
 
 @pytest.mark.parametrize("name", [name for name in RIGS_BY_NAME if name not in SIMULATIONS])
 def test_no_device_that_is_not_simulated_opens_for_a_hand_without_an_acceptance(name, monkeypatch, tmp_path):
-    """Whatever stands behind the name: here it is a driver that checks nothing itself."""
+    """Behind each name stands a driver that checks nothing itself."""
     rig = OwnRig(says_simulated=False)
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
     monkeypatch.setitem(RIGS_BY_NAME, name, lambda settings, seed: rig)
