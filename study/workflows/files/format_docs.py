@@ -188,7 +188,7 @@ def formats_markdown() -> str:
         "## Calibration of a linkage (`.h5`)",
         "What a device says of its linkage over a grid of positions (`hapteq calibrate`); arrays have checksums. The "
         "file begins with a block of 512 bytes that HDF5 leaves to its user, and that readers skip: the SHA-256 and "
-        "the size of all that follows. By it a damaged file is refused before the HDF5 library, which may hang, sees it. "
+        "the size of all that follows, by which a damaged file is refused before the HDF5 library, which may hang. "
         "Files of other programs may be without.",
         _table(CALIBRATION_LAYOUT),
         *_mechanical_models(),
