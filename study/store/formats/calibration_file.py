@@ -17,6 +17,13 @@ from study.store.disk.strict_json import load_json
 FORMAT, VERSION = "hapteq-calibration", 1
 KIND = "calibration of a linkage"
 
+ABOUT = (
+    "What a device says of its linkage over a grid of positions (`hapteq calibrate`); arrays have checksums. The file "
+    "begins with a block of 512 bytes that HDF5 leaves to its user and that readers skip: SHA-256 and size of all that "
+    "follows. By them a damaged file is refused before the HDF5 library sees it, which may hang on such a file. Files "
+    "of other programs may be without."
+)
+
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
     Entry("version", "attribute, whole number", f"{VERSION}"),
