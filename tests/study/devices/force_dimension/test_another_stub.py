@@ -79,6 +79,41 @@ def test_a_device_that_tells_no_force_is_not_judged_by_it(stepped_stub, rigs, to
     assert lost_words(stepped_stub, rigs, lambda stub: None) == (Fault.NONE, "")
 
 
+@pytest.mark.parametrize("stiffness", [0, 150, 1000])
+@pytest.mark.parametrize(("amplitude_n", "frequency_hz"), [(1.0, 5), (1.0, 20), (2.0, 25), (3.0, 40), (3.0, 50)])
+def test_an_encoder_that_freezes_is_noticed_within_a_second_under_a_force_that_moves_any_hand(
+    stepped_stub, rigs, amplitude_n, frequency_hz, stiffness
+):
+    stepped_stub.set("stiffness", stiffness)
+    clock = VirtualClock()
+    with contextlib.closing(SafeDevice(stepped_stub.rig(), rigs.SETTINGS, clock)) as device:
+        device.hold(rigs.sine(amplitude_n, frequency_hz))
+        clock.sleep(0.25)
+        stepped_stub.set("frozen", 1)
+        for _ in range(10):
+            device.keep_alive()
+            clock.sleep(0.1)
+        assert device.fault() is Fault.STALE
+        assert not stepped_stub.applied_n.any()
+        device.release()
+
+
+@pytest.mark.parametrize("frequency_hz", [5, 20, 50])
+def test_an_encoder_that_freezes_under_a_weak_force_pulls_no_harder_than_it_did(stepped_stub, rigs, frequency_hz):
+    """Dry friction holds a hand as still: it cannot be told."""
+    clock = VirtualClock()
+    with contextlib.closing(SafeDevice(stepped_stub.rig(), rigs.SETTINGS, clock)) as device:
+        stepped_stub.set("frozen", 1)
+        stepped_stub.move(0.02, 0.0, 0.0)
+        device.hold(rigs.sine(0.2, frequency_hz))
+        for _ in range(30):
+            device.keep_alive()
+            clock.sleep(0.1)
+        assert device.fault() is Fault.NONE
+        device.release()
+    assert stepped_stub.get("peak_n") <= 0.2 + 1e-6
+
+
 @pytest.mark.parametrize("kind", range(1, 8))
 def test_a_position_that_is_no_number_lets_go_on_each_axis(stepped_stub, rigs, kind):
     """NaN, infinite, or beyond all measure."""
