@@ -17,7 +17,7 @@ from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.session.resume_session import already_finished
 from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
 
-DEVICE_ADVICE = "Ask hapteq doctor --device with the device's name what is wrong with it, and mend that. "
+DEVICE_ADVICE = "Run hapteq doctor --device NAME, which says what is wrong with it, and mend that. "
 OF_THE_DEVICE = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
 """Faults that a look at the device may explain."""
 
