@@ -36,10 +36,11 @@ SEED ?= 95000
 STUDIES ?= 400
 COUNTED ?= build/calibration
 SECONDS_OF_WORK ?= 600
+TROUBLES ?= 200
 BANK ?= bank-$(SEED)
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank prove-browser prove-formats coverage calibration docs site clean \
+.PHONY: help study test check fix bench prove prove-study prove-equalizer prove-diagnosis prove-bank prove-troubles prove-browser prove-formats coverage calibration docs site clean \
 	types imports compiled $(TESTED)
 
 help: ## Show what can be made
@@ -93,6 +94,9 @@ prove-diagnosis: $(VENV)/.installed-test ## The slow tests of the diagnosis, eff
 
 prove-bank: $(VENV)/.installed-prove ## The blind proof of the diagnosis (CASES=600 SEED=95000 BANK=DIR); repeated, it goes on
 	$(BIN)/hapteq prove --controls --cases $(CASES) --seed $(SEED) --out $(BANK) --table docs/proof/bank-$(SEED).csv
+
+prove-troubles: $(VENV)/.installed-test ## Whole sessions on the driver's stub, screen, engine, loop and sensors killed and stalled (TROUBLES=200)
+	TROUBLES=$(TROUBLES) $(BIN)/python -m pytest -m slow -s tests/stories/test_random_troubles_of_a_study.py
 
 prove-browser: $(VENV)/.installed-test ## A whole session in headless Chromium (the system's package chromium), by keys
 	$(BIN)/python -m pytest -m slow tests/stories/test_a_study_in_a_browser.py

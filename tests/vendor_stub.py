@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import math
 import shutil
 import subprocess
 import sys
@@ -62,6 +63,8 @@ class Stub:
         self._library.stub_sensor.argtypes = [ctypes.c_void_p, ctypes.c_int]
         self._library.stub_advance.argtypes = [ctypes.c_double]
         self._library.stub_move.argtypes = [ctypes.c_double] * 3
+        self._library.stub_fail.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.c_double]
+        self._library.stub_delay.argtypes = [ctypes.c_char_p, ctypes.c_double]
 
     def set(self, name: str, value: float) -> None:
         self._library.stub_set(name.encode(), value)
@@ -74,6 +77,14 @@ class Stub:
     def peek(self, name: str) -> float:
         """While another program drives the device: what it knows as of its last call."""
         return float(self._library.stub_peek(name.encode()))
+
+    def fail(self, function: str, code: int = 2, times: float = math.inf) -> None:
+        """The next calls of this function of the vendor's answer an error. The last function that was named counts."""
+        self._library.stub_fail(function.encode(), code, times)
+
+    def delay(self, function: str, seconds: float) -> None:
+        """Each call of it takes so long."""
+        self._library.stub_delay(function.encode(), seconds)
 
     def advance(self, seconds: float) -> None:
         self._library.stub_advance(seconds)

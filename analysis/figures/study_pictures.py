@@ -9,7 +9,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.psychometric import draw_people_curves, draw_person_curves
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
-from analysis.figures.units import draw_units
+from analysis.figures.units import draw_units, is_drawn
 from analysis.psychophysics.detection import above_detection
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.hierarchy.answers import count_answers
@@ -60,7 +60,11 @@ def _thresholds_picture(analysis: StudyAnalysis) -> Picture:
 
 def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
     """Draw the figures in other units; empty where newtons are the only unit."""
-    tables = [table for table in _unit_tables(analysis) if any(v is not None for row in table.values for v in row)]
+    tables = [
+        table
+        for table in _unit_tables(analysis)
+        if any(is_drawn(v, table.quantity) for row in table.values for v in row)
+    ]
     if len(tables) < 2:
         return []
     return [

@@ -33,7 +33,8 @@ _SPREAD = 0.4
 
 
 def draw_units(tables: Sequence[ThresholdTable]) -> Figure:
-    """One panel per table with any value, at least one. Tables: the same participants and frequencies."""
+    """One panel per table with any value that `is_drawn`, at least one. Tables: the same participants and
+    frequencies."""
     columns = 2 if len(tables) > 1 else 1
     lines = -(-len(tables) // columns)
     figure = new_figure(PAGE_IN, 2.5 * lines + 0.4)
@@ -46,9 +47,15 @@ def draw_units(tables: Sequence[ThresholdTable]) -> Figure:
     return figure
 
 
+def is_drawn(value: float | None, quantity: Quantity) -> bool:
+    """A ratio scale has no zero: an accelerometer that stands still makes one of every threshold."""
+    return value is not None and (value > 0 or quantity == "above_detection_db")
+
+
 def _draw_table(axes: Axes, table: ThresholdTable) -> None:
     plain_axes(axes)
-    values = np.array([[np.nan if value is None else value for value in row] for row in table.values])
+    shown = [[value if is_drawn(value, table.quantity) else np.nan for value in row] for row in table.values]
+    values = np.array(shown, dtype=float)
     offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(values)) if len(values) > 1 else np.zeros(1)
     for person, row in enumerate(values):
         at = np.arange(len(row)) + offsets[person]

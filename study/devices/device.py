@@ -95,6 +95,8 @@ class Health:
     """The longest from when a tick was due until its work, or that of the one that came in its place, was done."""
     sensor: SensorFacts | None = None
     """Known when it is over. None where the acceleration is read with each tick, as in a simulation, or not at all."""
+    why: str = ""
+    """Of a lost device, in its driver's words: a sentence without a full stop. Empty where the fault says it all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

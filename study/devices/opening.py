@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from datetime import date
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -98,6 +98,7 @@ def open_device(
     rig = find_rig(name, settings, seed)
     ring: Ring | None = None
     try:
+        _check_hand(name, rig.info, settings)
         ring = Ring(telemetry) if telemetry or (own_process and not clock.virtual) else None
         return SafeDevice(rig, settings, clock, ring)
     except BaseException:
@@ -105,6 +106,13 @@ def open_device(
         if ring is not None:
             ring.remove()
         raise
+
+
+def _check_hand(name: str, info: DeviceInfo, settings: DeviceSettings) -> None:
+    """Raises `DeviceError` where a hand is to hold what was not accepted, also where its driver is a lab's own and says
+    that it is simulated: whether it is, the name decides."""
+    if settings.hand_on_handle and (needs_real_time(name) or not info.simulated):
+        accepted_baseline(info, datetime.now(UTC).date())
 
 
 @contextlib.contextmanager
@@ -248,7 +256,13 @@ def accept_device(
     Raises `DeviceError`. The caller has checked everything else before. baseline: name and SHA-256 of the recording
     that the daily check is to compare with."""
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
-    from study.devices.force_dimension.force_proof import ASKED_SHARE, FORCE_N, prove_cap_holds, prove_force_goes
+    from study.devices.force_dimension.force_proof import (
+        ASKED_SHARE,
+        FORCE_N,
+        check_provable,
+        prove_cap_holds,
+        prove_force_goes,
+    )
     from study.devices.rigs_by_name import RIGS_BY_NAME
     from study.devices.safe import SafeDevice
 
@@ -256,6 +270,7 @@ def accept_device(
     settings = replace(settings, hand_on_handle=False, limits=limits)
     rig: Any = RIGS_BY_NAME[name](settings, 0)
     try:
+        check_provable(rig)
         device = SafeDevice(rig, settings, clock)
         with contextlib.closing(device):
             most_given_n = prove_cap_holds(device, rig)

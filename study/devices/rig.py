@@ -60,8 +60,8 @@ class Rig(Protocol):
         """Command a force, shape (3,), x, y, z; held until the next one."""
         ...
 
-    def close(self) -> None:
-        """Force off, disconnect. Never raises; may be called again."""
+    def close(self) -> bool | None:
+        """Force off, disconnect. False where the device did not take it. Never raises; may be called again."""
         ...
 
 

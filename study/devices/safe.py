@@ -32,6 +32,11 @@ BLOCK_S = 0.05
 
 VIRTUAL_BLOCK_S = 5.0
 
+NOT_CLOSED = (
+    "the device did not answer when it was closed: it got zero force, and its brakes may be off; what was measured is "
+    "saved; switch it off before a hand touches the handle, and on again before the next session"
+)
+
 PATIENCE_S = 1.0
 """Time granted beyond all fades, before a device that does not become still counts as lost."""
 
@@ -96,7 +101,13 @@ class SafeDevice:
         return Fault.STOPPED if self._governor.stop_asked and fault is not Fault.FORCE_LEFT else fault
 
     def health(self) -> Health:
-        return replace(self._governor.health(), fault=self.fault())
+        return self._told(replace(self._governor.health(), fault=self.fault()))
+
+    def _told(self, health: Health) -> Health:
+        failure = self._runner.failure
+        if failure is None:
+            return health
+        return replace(health, why=failure.happened.rstrip(".") if isinstance(failure, DeviceError) else str(failure))
 
     def release(self) -> Played:
         stimulus = self._held
@@ -105,7 +116,8 @@ class SafeDevice:
         self._governor.ask_release()
         self._wait_until_still(stimulus.fade_out_s)
         self._held = None
-        return record_held_stimulus(self._governor, self._info, self._apart)
+        played = record_held_stimulus(self._governor, self._info, self._apart)
+        return replace(played, health=self._told(played.health))
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
         self._must_be_idle()
@@ -150,10 +162,11 @@ class SafeDevice:
         # Last, so that a close that was interrupted is made good for when the program ends.
         self._closed = True
         atexit.unregister(self._close_at_exit)
-        if not self._runner.force_off:
+        if not (self._runner.force_off and self._runner.disconnected):
             # Closing never raises and may be the last thing a program does: the person at the handle must hear it.
+            said = NOT_CLOSED if self._runner.force_off else Fault.FORCE_LEFT.value
             with contextlib.suppress(OSError):
-                sys.stderr.writelines([f"{Fault.FORCE_LEFT.value}\n"])
+                sys.stderr.writelines([f"{said}\n"])
 
     def _close_at_exit(self) -> None:
         """The program's last chance: it ignores Ctrl-C, for the interpreter stops all threads next, the one that writes

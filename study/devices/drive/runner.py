@@ -80,6 +80,8 @@ class Runner(Protocol):
     """What took the rig away, if it is gone."""
     force_off: bool
     """False if the last zero force may not have reached the rig."""
+    disconnected: bool
+    """False if the rig was closed and did not take it, or not in time."""
 
     @property
     def moving(self) -> bool:
@@ -124,7 +126,7 @@ class CompiledRunner:
     """A simulated rig, in compiled blocks. Its force is off as soon as no block runs."""
 
     catches_up = True
-    force_off = True
+    force_off = disconnected = True
 
     def __init__(self, rig: CompiledRig, governor: Governor, block_ticks: int) -> None:
         self._parts = parts(rig.sense, rig.advance)

@@ -26,13 +26,14 @@ from study.devices.rig import READING_SIZE, Rig
 class Standby:
     """Started beforehand: no thread can be started any more while the interpreter ends."""
 
-    def __init__(self, action: Callable[[], None], name: str) -> None:
+    def __init__(self, action: Callable[[], bool | None], name: str) -> None:
         self._action = action
         self._asked: SimpleQueue[SimpleQueue[bool] | None] = SimpleQueue()
         threading.Thread(target=self._work, name=name, daemon=True).start()
 
     def run(self, patience_s: float) -> bool:
-        """Whether it was done within patience_s, without an error. It goes on even if the caller is interrupted."""
+        """Whether it was done within patience_s, with neither an error nor False. It goes on even if the caller is
+        interrupted."""
         answer: SimpleQueue[bool] = SimpleQueue()
         self._asked.put(answer)
         try:
@@ -47,8 +48,7 @@ class Standby:
     def _work(self) -> None:
         while (answer := self._asked.get()) is not None:
             try:
-                self._action()
-                answer.put(True)
+                answer.put(self._action() is not False)
             except BaseException:  # noqa: BLE001 - the answer says so, and the next one who asks needs this thread
                 answer.put(False)
 
@@ -76,7 +76,7 @@ class SteppedRunner:
         self._now_s = now_s
         self.catches_up = catches_up
         self.failure: BaseException | None = None
-        self.force_off = True
+        self.force_off = self.disconnected = True
         self._seen: Seen | None = None
         self.course: FloatArray = np.zeros(COURSE_SIZE)
         halves = halves_of(rig) if now_s is None or monotonic else None
@@ -183,7 +183,7 @@ class SteppedRunner:
             self._silence(Fault.LOST if self.moving else Fault.NONE)
         finally:
             self._closed = True
-            self._disconnect.run(CLOSE_PATIENCE_S)
+            self.disconnected = self._disconnect.run(CLOSE_PATIENCE_S)
         self._ended = True
         self._zero.end()
         self._disconnect.end()

@@ -65,6 +65,22 @@ class Silenced(Protocol):
     def force_on(self) -> bool: ...
 
 
+SHOWN = ("given_n", "given_past_this_n", "withhold", "force_on")
+"""Of `Telling` and `Silenced`."""
+
+
+def check_provable(rig: object) -> None:
+    """Raises `DeviceError` for a driver that cannot show what an acceptance signs: a lab's own may be without."""
+    missing = [name for name in SHOWN if not hasattr(rig, name)]
+    if missing:
+        raise DeviceError(
+            "The device was not accepted",
+            f"Its driver cannot show that the force goes and stays within its cap: it has no {', '.join(missing)}.",
+            "Write these methods as `Telling` and `Silenced` of study/devices/force_dimension/force_proof.py ask for "
+            "them. Until then no hand may hold the device.",
+        )
+
+
 def prove_cap_holds(device: Capped, rig: Telling) -> float:
     """The most that the device said it gave, N, when `ASKED_SHARE` times FORCE_N were asked of each layer in turn.
 
@@ -82,9 +98,9 @@ def prove_cap_holds(device: Capped, rig: Telling) -> float:
     device.hold_unchecked(shaking)
     of_ticks_n = _most_given_n(device, rig)
     device.release()
+    _check_given("at each tick", of_ticks_n)
     if device.fault() is not Fault.NONE:
         raise _not_accepted_error(f"The force did not last: {device.fault().value}.")
-    _check_given("at each tick", of_ticks_n)
     of_library_n = rig.given_past_this_n(ASKED_SHARE * FORCE_N)
     _check_given("of the library", of_library_n)
     return max(of_ticks_n, of_library_n)

@@ -14,9 +14,41 @@ from numba import njit
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.newest_sample import CLIPPED, COUNT, FRESH_S, REST, ROWS, SENSED, TAKEN_S
 from study.devices.drive.compiled_drive import SENSE_SIGNATURE, WRITE_SIGNATURE
-from study.devices.force_dimension.handle import FORCE_ON_PLACE, OFF_CAUSE_PLACE, SCALED, STALE, WATCHDOG_CAUSE
+from study.devices.force_dimension.handle import SCALED, STALE
+from study.devices.force_dimension.looks import (
+    BRAKES,
+    CAP_N,
+    CLOSED,
+    DROPS_AFTER_S,
+    ENABLE,
+    FAILED,
+    FAILED_BEFORE,
+    FORCE,
+    IS_CLOSED,
+    LET_GO,
+    LOCKED,
+    NUMBER,
+    POSITION,
+    READS,
+    REFUSED,
+    REFUSED_N,
+    RELEASED,
+    REPEATED,
+    REPEATS,
+    SENT_S,
+    SENT_ZERO,
+    TOO_STRONG,
+    WEAK,
+    WITHHELD_UNTIL_S,
+    beyond,
+    check_on,
+    failed,
+    look,
+    note_sent,
+    of_library,
+)
 from study.devices.governor.compiling import fingerprint, part
-from study.devices.native import SYSTEM_SIZE, Addresses, acquire, call_int, now_s, release, room_for_16, word
+from study.devices.native import Addresses, acquire, call_int, now_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
 
 LOOK_EVERY = 10
@@ -33,69 +65,6 @@ A force whose peaks alone are scaled is so only for some milliseconds in a row, 
 ROUNDING = 1 + 1e-9
 LOCK_S = 0.002
 """A write lasts a tenth of that: what waits longer waits for a call that hangs."""
-
-POSITION, FORCE, STATUS, BUTTONS, BRAKES, ENABLE, CALLS_SIZE = range(SYSTEM_SIZE, SYSTEM_SIZE + 7)
-"""Behind the places of `native`: addresses of the library's functions, `LIBRARY`."""
-LIBRARY = ("dhdGetPosition", "dhdSetForce", "dhdGetStatus", "dhdGetButtonMask", "dhdSetBrakes", "dhdEnableForce")
-
-(
-    NUMBER, CAP_N, DROPS_AFTER_S, READS, REPEATED, TOO_STRONG, PRESSED, SENT_S, SENT_ZERO, WITHHELD_UNTIL_S, CLOSED,
-    LET_GO, FAILED, OFF_CAUSE, REFUSED_N, CELLS_SIZE,
-) = range(16)  # fmt: skip
-"""Cells of the driver. REPEATED, TOO_STRONG: readings and forces beyond their share, as `_beyond` counts; PRESSED: mask
-of buttons; OFF_CAUSE, REFUSED_N: for the words about a failure."""
-
-OF_LIBRARY = 1
-"""The code of the first function of LIBRARY: a call of it failed. The others follow."""
-(REPEATS, RELEASED, REFUSED, LOCKED, IS_CLOSED, WEAK, FAILED_BEFORE, SAID) = range(OF_LIBRARY + len(LIBRARY), 15)
-"""SAID: it failed elsewhere, and the words are there."""
-
-
-@part
-def _failed(cells: FloatArray, code: int) -> int:
-    """The first failure stays."""
-    if cells[FAILED] == 0.0:
-        cells[FAILED] = code
-    return code
-
-
-@part
-def _of_library(cells: FloatArray, function: int) -> int:
-    return _failed(cells, OF_LIBRARY + function - SYSTEM_SIZE)
-
-
-@part
-def _beyond(count: float, happened: bool, share: float) -> float:
-    """How often something happened beyond this share of all times. A hair below the sum of its steps."""
-    return max(0.0, count + (1.0 if happened else 0.0) - share + 1e-12)
-
-
-@part
-def _number_at(status: int, place: int) -> int:
-    """The int at a place of a status: two are in a word."""
-    return int((word(status, place // 2) >> (32 * (place % 2))) & 0xFFFFFFFF)
-
-
-@part
-def _check_on(calls: Addresses, cells: FloatArray) -> int:
-    """Whether it takes forces, or is silent as its watchdog has it after a zero. Else OFF_CAUSE says why not."""
-    status = room_for_16()
-    if call_int(calls[STATUS], (status, np.int32(cells[NUMBER]))) < 0:
-        return _of_library(cells, STATUS)
-    if _number_at(status, FORCE_ON_PLACE) != 0:
-        return 0
-    cause = _number_at(status, OFF_CAUSE_PLACE)
-    if cells[SENT_ZERO] != 0.0 and cause == WATCHDOG_CAUSE:
-        return -1
-    if cells[FAILED] == 0.0:
-        cells[OFF_CAUSE] = cause
-    return _failed(cells, RELEASED)
-
-
-@part
-def _look(calls: Addresses, cells: FloatArray) -> int:
-    cells[PRESSED] = call_int(calls[BUTTONS], (np.int32(cells[NUMBER]),)) & 0xFFFFFFFF
-    return max(0, _check_on(calls, cells))
 
 
 @part
@@ -126,15 +95,15 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
     answer = call_int(calls[POSITION], asked)
     if answer < 0:
-        return _of_library(cells, POSITION)
+        return of_library(cells, POSITION)
     if cells[READS] % LOOK_EVERY == 0.0:
-        code = _look(calls, cells)
+        code = look(calls, cells)
         if code != 0:
             return code
     cells[READS] += 1.0
-    cells[REPEATED] = _beyond(cells[REPEATED], answer == STALE, STALE_SHARE)
+    cells[REPEATED] = beyond(cells[REPEATED], answer == STALE, STALE_SHARE)
     if cells[REPEATED] >= STALE_FOR * (1.0 - STALE_SHARE):
-        return _failed(cells, REPEATS)
+        return failed(cells, REPEATS)
     reading[SENSOR_CLIPPED] = 0.0
     if samples.shape[0] > 1:
         _sense_acceleration(samples, now_s(calls), reading)
@@ -156,15 +125,15 @@ def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float
 def _wake(calls: Addresses, cells: FloatArray) -> int:
     """After a silence that was longer than the watchdog. In the middle of a force that is an end; with none it is
     not: the computer was asleep, or nothing was played."""
-    code = _check_on(calls, cells)
+    code = check_on(calls, cells)
     if code >= 0:
         return code
     number = np.int32(cells[NUMBER])
     if call_int(calls[BRAKES], (np.int32(0), number)) < 0:
-        return _of_library(cells, BRAKES)
+        return of_library(cells, BRAKES)
     if call_int(calls[ENABLE], (np.int32(1), number)) < 0:
-        return _of_library(cells, ENABLE)
-    return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else _of_library(cells, FORCE)
+        return of_library(cells, ENABLE)
+    return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else of_library(cells, FORCE)
 
 
 @part
@@ -177,24 +146,26 @@ def _send(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     x, y, z = force[0], force[1], force[2]
     answer = _set_force(calls, cells, x, y, z)
     if answer < 0:
-        return _of_library(cells, FORCE)
+        return of_library(cells, FORCE)
     cells[SENT_S] = now_s(calls)
+    note_sent(cells, x, y)
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
-    cells[TOO_STRONG] = _beyond(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
+    cells[TOO_STRONG] = beyond(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
     if cells[TOO_STRONG] >= SCALED_FOR * (1.0 - SCALED_SHARE):
-        return _failed(cells, WEAK)
+        return failed(cells, WEAK)
     return 0
 
 
 @part
 def _zero(calls: Addresses, cells: FloatArray) -> int:
     if _set_force(calls, cells, 0.0, 0.0, 0.0) < 0:
-        return _of_library(cells, FORCE)
+        return of_library(cells, FORCE)
     if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
         # A force was cut off: its call may hang still, and must find a device that takes none.
-        code = _check_on(calls, cells)
+        code = check_on(calls, cells)
         if code != 0 and code != RELEASED:
             return code
+    note_sent(cells, 0.0, 0.0)
     cells[SENT_ZERO], cells[TOO_STRONG] = 1.0, 0.0
     if not _is_silent(calls, cells):
         cells[SENT_S] = now_s(calls)
@@ -224,12 +195,12 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
         code = _write_zero(calls, cells)
         if cells[FAILED] == 0.0:
             cells[REFUSED_N] = norm
-        return code if code != 0 else _failed(cells, REFUSED)
+        return code if code != 0 else failed(cells, REFUSED)
     if cells[FAILED] != 0.0:
         return FAILED_BEFORE
     if not acquire(calls, LOCK_S):
-        return _failed(cells, LOCKED)
-    code = _send(calls, cells, force) if cells[CLOSED] == 0.0 else _failed(cells, IS_CLOSED)
+        return failed(cells, LOCKED)
+    code = _send(calls, cells, force) if cells[CLOSED] == 0.0 else failed(cells, IS_CLOSED)
     release(calls)
     return code
 

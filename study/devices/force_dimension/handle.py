@@ -14,8 +14,11 @@ WATCHDOG_UNIT_S = 125e-6
 STATUS_SIZE = 32
 """17 in SDK 3.17.5; room for more, since a library writes as many as it knows."""
 
-FORCE_ON_PLACE, OFF_CAUSE_PLACE = 5, 14
+POWERED_PLACE, CALIBRATED_PLACE, FORCE_ON_PLACE, OFF_CAUSE_PLACE = 0, 3, 5, 14
 """Indices in the library's status array."""
+
+UNPOWERED_CAUSE, UNCALIBRATED_CAUSE = 101, 102
+"""Causes of our own: the library states them in other places of the status, and that its forces are on."""
 OFF_CAUSES = {
     1: "a button of the device was pressed",
     2: "the handle moved faster than the device allows",
@@ -23,6 +26,8 @@ OFF_CAUSES = {
     4: "a program switched it off",
     5: "the USB connection broke",
     6: "the hand was not on the handle (dead-man's switch)",
+    UNPOWERED_CAUSE: "its power supply is off",
+    UNCALIBRATED_CAUSE: "it does not know its place any more, and needs to be calibrated",
 }
 WATCHDOG_CAUSE = 3
 
@@ -82,8 +87,8 @@ class Handle:
         values = (c_int * STATUS_SIZE)()
         self.library.call("dhdGetStatus", values, self.number)
         return Status(
-            powered=bool(values[0]),
-            calibrated=bool(values[3]),
+            powered=bool(values[POWERED_PLACE]),
+            calibrated=bool(values[CALIBRATED_PLACE]),
             force_on=bool(values[FORCE_ON_PLACE]),
             braking=bool(values[6]),
             off_cause=int(values[OFF_CAUSE_PLACE]),

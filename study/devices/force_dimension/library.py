@@ -128,7 +128,8 @@ class Library:
 
 def _load(path: Path) -> ctypes.CDLL:
     try:
-        return ctypes.CDLL(str(path))
+        # Windows looks for what it needs itself beside a library only where that is named in full.
+        return ctypes.CDLL(str(path.absolute()))
     except OSError as error:
         raise DeviceError(
             "The device's library cannot be loaded",

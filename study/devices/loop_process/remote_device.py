@@ -265,4 +265,5 @@ class RemoteDevice:
         return Fault.STOPPED if self._stopped else Fault.LOST
 
     def _health_of_the_lost(self) -> Health:
-        return replace(self._health, fault=self._fault_of_the_lost())
+        why = f"the process of its loop is gone: {self._lost}" if self._lost else self._health.why
+        return replace(self._health, fault=self._fault_of_the_lost(), why=why)

@@ -1,5 +1,10 @@
-"""Our HDF5 files: opened with their format checked, written atomically."""
+"""Our HDF5 files: opened with their format checked, written atomically.
 
+A sealed file begins with a block of text that HDF5 leaves to its user, with the check sum of all that follows: the HDF5
+library may hang on a damaged file, so the sum is checked before the library sees it.
+"""
+
+import hashlib
 import io
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,6 +22,16 @@ from study.store.disk.hdf5_attributes import AttributeProblemError, numbers_attr
 from study.store.disk.hdf5_contents import check_contents
 
 Value = TypeVar("Value")
+
+SEAL = b"hapteq sha256 "
+SEAL_BYTES = 512
+"""The smallest block that HDF5 leaves to its user."""
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""First bytes of HDF5: at the start of a file without such a block."""
+BROKEN_SEAL = (
+    "its content does not fit the check sum at its beginning: it was damaged, cut off, or changed by another program "
+    "since it was written"
+)
 
 
 class Problems:
@@ -48,9 +63,10 @@ def format_of(path: Path) -> str:
 
 
 @contextmanager
-def open_hdf5(path: Path, kind: str, format_name: str, version: int) -> Iterator[Any]:
-    """The open file after its format and version are checked. Raises CannotReadError, UnusableFileError."""
-    with open_any_hdf5(path, kind) as file:
+def open_hdf5(path: Path, kind: str, format_name: str, version: int, *, sealed: bool = False) -> Iterator[Any]:
+    """The open file after its format and version are checked. sealed: as `write_hdf5` writes this format; one that
+    another program wrote may have no such block at all. Raises CannotReadError, UnusableFileError."""
+    with open_any_hdf5(path, kind, sealed=sealed) as file:
         try:
             found = text_attribute(file, "format")
             (number,) = numbers_attribute(file, "version", 1)
@@ -76,20 +92,43 @@ def float_dataset(file: Any, name: str, shape: str) -> FloatArray:
     return np.asarray(dataset[()], dtype=np.float64)
 
 
-def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool) -> None:
+def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool, sealed: bool = False) -> None:
     """`fill` gets an open file in memory, which is then written atomically: HDF5 on a full disk would leave a
     damaged file."""
     buffer = io.BytesIO()
-    with h5py.File(buffer, "w") as file:
+    with h5py.File(buffer, "w", userblock_size=SEAL_BYTES if sealed else 0) as file:
         fill(file)
-    write_atomically(path, buffer.getvalue(), overwrite=overwrite)
+    content = buffer.getvalue()
+    write_atomically(path, with_seal(content) if sealed else content, overwrite=overwrite)
+
+
+def with_seal(content: bytes) -> bytes:
+    """Of a file with a user's block: the same, with its check sum in that block."""
+    body = content[SEAL_BYTES:]
+    return _seal(hashlib.sha256(body).hexdigest(), len(body)) + body
+
+
+def _seal(digest: str, size: int) -> bytes:
+    return (SEAL + f"{digest} {size} bytes follow\n".encode("ascii")).ljust(SEAL_BYTES, b"\0")
+
+
+def _check_seal(path: Path, kind: str, sealed: bool) -> None:
+    """Raises UnusableFileError where a file is not as it was sealed, and OSError."""
+    with open_regular(path) as file:
+        start = file.read(SEAL_BYTES)
+        if start.startswith(SEAL):
+            broken = _seal(hashlib.file_digest(file, "sha256").hexdigest(), file.tell() - SEAL_BYTES) != start
+        else:  # what is HDF5 from a later place on had a seal
+            broken = sealed and not start.startswith(SIGNATURE) and is_hdf5(path)
+    if broken:
+        raise UnusableFileError(path, kind, (BROKEN_SEAL,))
 
 
 @contextmanager
-def open_any_hdf5(path: Path, kind: str) -> Iterator[Any]:
+def open_any_hdf5(path: Path, kind: str, *, sealed: bool = False) -> Iterator[Any]:
     """The open file of any format after its contents are checked. Raises CannotReadError, UnusableFileError."""
     try:
-        open_regular(path).close()
+        _check_seal(path, kind, sealed)
     except OSError as problem:
         raise CannotReadError(path, problem) from problem
     try:

@@ -17,6 +17,13 @@ from study.store.disk.strict_json import load_json
 FORMAT, VERSION = "hapteq-calibration", 1
 KIND = "calibration of a linkage"
 
+ABOUT = (
+    "What a device says of its linkage over a grid of positions (`hapteq calibrate`); arrays have checksums. The file "
+    "begins with a block of 512 bytes that HDF5 leaves to its user and that readers skip: SHA-256 and size of all that "
+    "follows. By them a damaged file is refused before the HDF5 library sees it, which may hang on such a file. Files "
+    "of other programs may be without."
+)
+
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
     Entry("version", "attribute, whole number", f"{VERSION}"),
@@ -42,7 +49,7 @@ DIMENSIONS = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3)"
 def read_calibration(path: Path) -> LinkageCalibration:
     """Raises CannotReadError, or UnusableFileError with all problems."""
     problems = Problems()
-    with open_hdf5(path, KIND, FORMAT, VERSION) as file:
+    with open_hdf5(path, KIND, FORMAT, VERSION, sealed=True) as file:
         parts = _parts(file, problems)
     if problems.found:
         raise UnusableFileError(path, KIND, tuple(problems.found))
@@ -63,7 +70,7 @@ def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
             file.create_dataset(name, data=getattr(calibration, name), fletcher32=True)
         file.attrs["provenance"] = json.dumps(dict(calibration.provenance), allow_nan=False)
 
-    write_hdf5(path, fill, overwrite=False)
+    write_hdf5(path, fill, overwrite=False, sealed=True)
 
 
 def _parts(file: Any, problems: Problems) -> dict[str, Any]:

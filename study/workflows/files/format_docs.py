@@ -31,6 +31,7 @@ from study.store.disk.csv_rows import columns, in_words
 from study.store.disk.layout import Entry
 from study.store.disk.text_file import write_text
 from study.store.formats import identified_model_file, mechanical_model_file, recording_layout, repeats_file
+from study.store.formats.calibration_file import ABOUT as CALIBRATION_ABOUT
 from study.store.formats.calibration_file import LAYOUT as CALIBRATION_LAYOUT
 from study.store.sessions import live_file, log_seal
 from study.store.sessions.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
@@ -55,8 +56,7 @@ def session_log_markdown() -> Iterable[str]:
         f"A line ends with the field `chain`, {log_chain.DIGITS} hexadecimal digits: the first of the SHA-256 of the "
         "checksum before it, a line feed, and the line's own bytes without this field (nor the comma before it, nor "
         f"the line end). Before the first line stand {log_chain.DIGITS} zeros. Lines that older versions wrote have no "
-        "`chain` and enter the hash all the same: where such a log goes on, its first checksum covers what came "
-        "before."
+        "`chain` and enter the hash all the same: where such a log goes on, its first checksum covers what was before."
     )
     yield (
         "When a session is closed, `seal.json` is written once: number of lines, bytes, the last checksum, and the "
@@ -186,7 +186,7 @@ def formats_markdown() -> str:
         "## Identified model (`.h5`)",
         _table(identified_model_file.LAYOUT),
         "## Calibration of a linkage (`.h5`)",
-        "What a device says of its linkage over a grid of positions (`hapteq calibrate`); arrays have checksums.",
+        CALIBRATION_ABOUT,
         _table(CALIBRATION_LAYOUT),
         *_mechanical_models(),
         "## Effects",

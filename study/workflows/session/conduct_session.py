@@ -61,6 +61,8 @@ class Conducted:
     """Why the sitting ended before the session was finished; empty if it is finished."""
     fault: Fault
     """The device fault, if that was why."""
+    why: str = ""
+    """The driver's words about it, where there are any."""
     withdrawn: bool = False
     """The participant withdrew consent: the caller erases the data."""
 
@@ -160,4 +162,4 @@ def _run(opened: OpenedSession, at: At, participant: Participant, known_steps: i
     for name in opened.state.sitting.not_counted:
         tell(f"{name} cannot be read: what the hand got in it is not in the vibration dose of today.", sitting)
     end = run_session(opened.state, sitting)
-    return Conducted(folder, end.state, end.left, end.fault, end.withdrawn)
+    return Conducted(folder, end.state, end.left, end.fault, end.why, end.withdrawn)

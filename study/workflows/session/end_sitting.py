@@ -17,6 +17,10 @@ from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.session.resume_session import already_finished
 from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
 
+DEVICE_ADVICE = "Run hapteq doctor --device NAME, which says what is wrong with it, and mend that. "
+OF_THE_DEVICE = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
+"""Faults that a look at the device may explain."""
+
 BUSY_ADVICE = "Close other programs, and measure with hapteq doctor whether that helps. "
 
 
@@ -51,10 +55,11 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
 
 def _not_finished(end: Conducted) -> StudyError:
     kind = UserInterruptError if end.fault is Fault.NONE else DeviceError
+    advice = DEVICE_ADVICE if end.fault in OF_THE_DEVICE else ""
     return kind(
         "The session is not finished",
-        f"The sitting ended: {end.left}.",
-        f"{BUSY_ADVICE if end.left.startswith(TOO_BUSY) else ''}Go on with: hapteq resume {end.folder.path}",
+        f"The sitting ended: {end.left}.{f' {end.why[0].upper()}{end.why[1:]}.' if end.why else ''}",
+        f"{BUSY_ADVICE if end.left.startswith(TOO_BUSY) else advice}Go on with: hapteq resume {end.folder.path}",
         saved=f"{answers_are(end.state.answers)} on disk.",
     )
 

@@ -41,6 +41,8 @@ class SessionEnd:
     """Why the sitting ended before the session was finished; empty if it is finished."""
     fault: Fault = Fault.NONE
     """The device fault, if that was why."""
+    why: str = ""
+    """The driver's words about it, where there are any."""
     withdrawn: bool = False
     """The participant withdrew consent: the data are to be erased."""
 
@@ -179,7 +181,8 @@ def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
 def _end(after: AfterTrial, sitting: Sitting) -> SessionEnd:
     state = stop_masking(_say_busy(write_notes(after.state, sitting), sitting), sitting)
     left = SessionInterrupted(utc=sitting.clock.utc(), reason=after.leave)
-    return SessionEnd(record(state, left, sitting), after.leave, after.fault)
+    why = sitting.device.health().why if after.fault is not Fault.NONE else ""
+    return SessionEnd(record(state, left, sitting), after.leave, after.fault, why)
 
 
 def _say_busy(state: SessionState, sitting: Sitting) -> SessionState:

@@ -102,4 +102,6 @@ def release_device(sitting: Sitting) -> Played:
     if played.health.fault is Fault.FORCE_LEFT:
         with contextlib.suppress(OSError):
             sitting.display.trouble(played.health.fault.value)
+    if played.health.why:
+        sitting.supervisor.note(NoteAsked("program", f"The device: {played.health.why}."))
     return played

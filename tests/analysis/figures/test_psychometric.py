@@ -83,6 +83,15 @@ def test_units_stand_side_by_side_with_cuts_and_medians(analysis):
     )
 
 
+def test_thresholds_of_zero_are_left_out_of_a_ratio_scale(analysis):
+    """An accelerometer that says the same all the time delivers nothing, as it says."""
+    table = threshold_table(analysis.thresholds, analysis.table.frequencies_hz, "threshold_mps2")
+    some = replace(table, values=tuple((0.0, *row[1:]) for row in table.values))
+    assert draw_units([analysis.table, some]).axes[1].get_ylim()[0] > 0
+    still = tuple(replace(row, threshold_mps2=0.0, threshold_mm=0.0) for row in analysis.thresholds)
+    assert "units" not in [picture.name for picture in study_pictures(replace(analysis, thresholds=still))]
+
+
 def test_above_detection_is_the_ratio_of_both_thresholds_where_both_are(everything, full_protocol):
     analysis = analyse_study(everything, full_protocol)
     table = above_detection(analysis.table, analysis.detection_table)

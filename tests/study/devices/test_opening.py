@@ -7,12 +7,15 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from protocols.definition.plausibility import PlausibilitySettings
-from study.devices.clock import VirtualClock
-from study.devices.device import DeviceSettings
+from study.devices import opening
+from study.devices.clock import RealClock, VirtualClock
+from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.opening import DEVICES, FRICTIONLESS, REAL, SIMULATIONS, open_device
+from study.devices.rig import READING_SIZE
 from study.devices.rigs_by_name import RIGS_BY_NAME
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError, ExitCode
@@ -139,3 +142,72 @@ def test_importing_the_opening_loads_no_driver():
     code = "import sys, study.devices.opening; print(sorted({'numba', 'scipy'} & set(sys.modules)))"
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"
+
+
+class OwnRig:
+    """A driver of a lab's own, over no library at all."""
+
+    def __init__(self, says_simulated: bool) -> None:
+        self.closed = False
+        self.drops_force_after_s = 0.03
+        self.info = DeviceInfo("own", says_simulated, 1000.0, 10.0, 0.3, details="serial 1")
+
+    def sense(self) -> np.ndarray:
+        return np.zeros(READING_SIZE)
+
+    def buttons(self) -> frozenset[int]:
+        return frozenset()
+
+    def write(self, force_n: np.ndarray) -> None:
+        """It takes every force."""
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture(params=[False, True], ids=["says that it is real", "says that it is simulated"])
+def own(request, monkeypatch, tmp_path):
+    """As docs/own_device.md says to put it in."""
+    rig = OwnRig(request.param)
+    monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
+    monkeypatch.setitem(RIGS_BY_NAME, "own", lambda settings, seed: rig)
+    monkeypatch.setattr(opening, "REAL", (*REAL, "own"))
+    return rig
+
+
+def test_a_driver_of_a_lab_s_own_opens_for_no_hand_without_an_acceptance(own, vendor):
+    with pytest.raises(DeviceError, match="own is locked for hands.*no acceptance of it"):
+        open_device("own", SETTINGS, RealClock(), seed=1, own_process=False)
+    assert own.closed
+    vendor.accept("own", details="serial 2")
+    with pytest.raises(DeviceError, match=r"Another was accepted \(own, serial 2\); this is own, serial 1"):
+        open_device("own", SETTINGS, RealClock(), seed=1, own_process=False)
+    vendor.accept("own", details="serial 1", on="2020-01-01")
+    with pytest.raises(DeviceError, match="holds for 180 days"):
+        open_device("own", SETTINGS, RealClock(), seed=1, own_process=False)
+    vendor.accept("own", details="serial 1")
+    open_device("own", SETTINGS, RealClock(), seed=1, own_process=False).close()
+
+
+def test_without_a_hand_a_driver_of_a_lab_s_own_opens(own):
+    settings = replace(SETTINGS, hand_on_handle=False)
+    open_device("own", settings, RealClock(), seed=1, own_process=False).close()
+
+
+def test_a_driver_that_cannot_show_its_force_is_not_accepted(own):
+    with pytest.raises(DeviceError, match="it has no given_n, given_past_this_n, withhold, force_on"):
+        opening.accept_device("own", SETTINGS, RealClock(), "Ada")
+    assert own.closed
+    with pytest.raises(DeviceError, match="locked for hands"):
+        open_device("own", SETTINGS, RealClock(), seed=1, own_process=False)
+
+
+@pytest.mark.parametrize("name", [name for name in RIGS_BY_NAME if name not in SIMULATIONS])
+def test_no_device_that_is_not_simulated_opens_for_a_hand_without_an_acceptance(name, monkeypatch, tmp_path):
+    """Behind each name stands a driver that checks nothing itself."""
+    rig = OwnRig(says_simulated=False)
+    monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(tmp_path / "device.toml"))
+    monkeypatch.setitem(RIGS_BY_NAME, name, lambda settings, seed: rig)
+    with pytest.raises(DeviceError, match="locked for hands"):
+        open_device(name, SETTINGS, RealClock(), seed=1, own_process=False)
+    assert rig.closed

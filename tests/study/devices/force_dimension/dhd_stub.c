@@ -27,11 +27,12 @@
   X(devices, 1) X(type, 33) X(sdk_minor, 17) X(in_use, 0) X(open_fails, 0) X(calibrated, 1) X(powered, 1)              \
   X(wall_time, 1) X(mass, 0.25) X(damping, 2) X(stiffness, 0) X(weight, 0) X(max_n, 12)                                \
   X(watchdog_works, 1) X(watchdog_settable, 1) X(watchdog_stretch, 1) X(latches, 1) X(force_enables, 1)                \
-  X(unplugged, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
+  X(unplugged, 0) X(unwritten, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
   X(late_every, 0) X(late_s, 0) X(write_fails, 0) X(read_fails, 0) X(stop_fails, 0) X(buttons, 0)                      \
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
-  X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                                                                \
+  X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                   \
+  X(silently_n, 1e9) /* a cap of its own, of which no answer says anything */ X(turned, 0) /* force the other way */                                                                  \
   /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
   X(friction, 0) X(gain, 1) X(mode_hz, 0) X(mode_kg, 0.02)                                                             \
   /* What its linkage says (dhd_linkage.h): a heavier second arm, its share; faults; where its reach ends. */           \
@@ -49,6 +50,8 @@ enum { SWITCHES(AS_ENUM) COUNT };
 typedef struct {
   double values[COUNT], position[3], velocity[3], commanded[3], told[3], swung[3], swinging[3], started, integrated, commanded_at, reset_at;
   double used; /* Since it was opened, a force was sent. */
+  char failing[40], late[40]; /* Names of functions: see stub_fail and stub_delay. */
+  double failing_code, failures_left, delay_s;
 } Device;
 static Device own = {.values = {SWITCHES(AS_VALUE)}, .started = -1};
 static Device *device = &own;
@@ -187,7 +190,20 @@ static void come_late(double count, double every, double late) {
 
 static int fail(int code) { last_error = code; return -1; }
 static int answer(void) { return p[unplugged] ? fail(COM) : p[opened] ? 0 : fail(NO_DEVICE); }
-static int begin(void) { lock(); catch_up(); return answer(); }
+/* Faults of the function of this name. */
+static int is_to_fail(const char *function) {
+  if (strcmp(function, device->failing) || device->failures_left <= 0) return 0;
+  device->failures_left--;
+  return fail((int)device->failing_code);
+}
+static void delay(const char *function) {
+  if (!strcmp(function, device->late)) come_late(1, 1, device->delay_s);
+}
+static int begin_of(const char *function) {
+  start(), delay(function), lock(), catch_up();
+  return is_to_fail(function) ? -1 : answer();
+}
+#define begin() begin_of(__func__)
 static int end(int code) { unlock(); return code; }
 #define PLAIN(...) do { int code = begin(); if (!code) { __VA_ARGS__; } return end(code); } while (0)
 
@@ -220,6 +236,19 @@ EXPORT void stub_set(const char *name, double value) {
   if (i == frozen) memcpy(shown, x, sizeof x);
   unlock();
 }
+/* The next calls of a function of the vendor's, so many, answer -1 with this error; each of its calls takes so long. */
+EXPORT void stub_fail(const char *function, double code, double times) {
+  lock(), start();
+  strncpy(device->failing, function, sizeof device->failing - 1);
+  device->failing_code = code, device->failures_left = times;
+  unlock();
+}
+EXPORT void stub_delay(const char *function, double seconds) {
+  lock(), start();
+  strncpy(device->late, function, sizeof device->late - 1);
+  device->delay_s = seconds;
+  unlock();
+}
 EXPORT double stub_get(const char *name) {
   lock(), catch_up();
   int i = find(name, strlen(name));
@@ -247,8 +276,9 @@ EXPORT void dhdGetSDKVersion(int *major, int *minor, int *release, int *revision
 EXPORT int dhdGetDeviceCount(void) { start(); return p[unplugged] ? 0 : (int)p[devices]; }
 EXPORT int dhdGetAvailableCount(void) { return p[in_use] ? 0 : dhdGetDeviceCount(); }
 EXPORT int dhdOpenID(char id) {
-  lock(), catch_up();
-  int code = 0;
+  start(), delay(__func__), lock(), catch_up();
+  int code = is_to_fail(__func__);
+  if (code) return end(code);
   if (p[unplugged] || id >= p[devices]) code = fail(NO_DEVICE);
   else if (p[in_use]) code = fail(IN_USE);
   else if (p[open_fails]) code = fail((int)p[open_fails]);
@@ -291,7 +321,9 @@ EXPORT int dhdGetPosition(double *px, double *py, double *pz, char id) {
     int stale = p[stale_every] > 0 && fmod(count, p[stale_every]) == 0;
     for (int i = 0; i < 3; i++)
       if (!stale && !p[frozen] && p[frozen_axis] != i + 1) shown[i] = x[i];
-    *px = p[no_number] ? NAN : shown[0] + (is_due(count, p[jump_every]) ? p[jump_m] : 0), *py = shown[1], *pz = shown[2];
+    double said[3] = {shown[0] + (is_due(count, p[jump_every]) ? p[jump_m] : 0), shown[1], shown[2]};
+    if (p[no_number]) said[((int)p[no_number] - 1) % 3] = p[no_number] > 6 ? -1e300 : p[no_number] > 3 ? INFINITY : NAN;
+    if (!p[unwritten]) *px = said[0], *py = said[1], *pz = said[2];
     code = stale ? 1 : 0;
   }
   end(code);
@@ -311,11 +343,13 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
     if (is_due(p[writes], p[scaled_every])) most = fmin(most, p[scaled_from_n]);
     if (p[cap_n] >= 0 && p[cap_works]) most = fmin(most, p[cap_n]);
     double share = asked > most * (1 + 1e-9) ? most / asked : 1;
+    code = share < 1 ? 2 : 0;
+    if (asked * share > p[silently_n]) share = p[silently_n] / asked;
+    if (p[turned]) share = -share;
     command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
     p[writes]++, p[last_write] = asked, last_command_s = p[now];
     if (asked > 0) device->used = 1;
     if (!p[latches] && !p[force_on] && p[cause] == 3) p[force_on] = 1, p[brake] = 0, p[cause] = 0;
-    code = share < 1 ? 2 : 0;
     if (!p[wall_time]) run_to(integrated_s + 0.001);
   }
   double count = p[writes];
@@ -328,7 +362,11 @@ EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
   PLAIN(*x_n = p[gain_told] * p[fx]; *y_n = p[gain_told] * p[fy]; *z_n = p[gain_told] * p[fz]);
 }
 EXPORT double dhdGetComFreq(char id) { (void)id; return 1.0; }
-EXPORT unsigned int dhdGetButtonMask(char id) { (void)id; return (unsigned int)p[buttons]; }
+EXPORT unsigned int dhdGetButtonMask(char id) {
+  (void)id;
+  int code = begin();
+  return code ? (unsigned int)end(code) : (unsigned int)end((int)p[buttons]);
+}
 EXPORT int dhdSetGravityCompensation(int value, char id) { (void)id; PLAIN(p[gravity] = value); }
 EXPORT int dhdSetEffectorMass(double kg, char id) { (void)id; PLAIN(p[effector] = kg); }
 EXPORT int dhdGetEffectorMass(double *kg, char id) { (void)id; PLAIN(*kg = p[effector]); }

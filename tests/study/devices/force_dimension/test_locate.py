@@ -42,6 +42,19 @@ def test_the_library_is_found_in_the_home_folder_and_below_program_files(tmp_pat
     assert find_library(computer(tmp_path, "win32", ProgramFiles=str(tmp_path / "programs"))) == newer
 
 
+def test_on_windows_the_folder_of_the_account_comes_before_that_of_all_and_a_variable_before_both(tmp_path):
+    folder = "Force Dimension/sdk-3.17.5/bin/drd64.dll"
+    of_all, own = laid(tmp_path / "programs" / folder), laid(tmp_path / "local" / folder)
+    named = laid(tmp_path / "sdk" / "bin" / "dhd64.dll")
+    places = {"ProgramFiles": str(tmp_path / "programs")}
+    assert find_library(computer(tmp_path, "win32", **places)) == of_all
+    places["LOCALAPPDATA"] = str(tmp_path / "local")
+    assert find_library(computer(tmp_path, "win32", **places)) == own
+    places["FDSDK"] = str(tmp_path / "sdk")
+    assert find_library(computer(tmp_path, "win32", **places)) == named
+    assert find_library(computer(tmp_path, "win32")) is None
+
+
 def test_the_newest_library_is_taken_and_libdrd_before_libdhd(tmp_path):
     for name in ("libdhd.so.3.20.0", "libdrd.so.3.9.0", "libdrd.so.3.17.5"):
         laid(tmp_path / "sdk" / "lib" / name)

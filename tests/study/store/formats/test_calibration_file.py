@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from study.store.disk.file_errors import UnusableFileError
+from study.store.disk.hdf5_file import SEAL_BYTES, with_seal
 from study.store.formats.calibration_file import LAYOUT, read_calibration, write_calibration
 from study.workflows.files.validate import validate_file
 from tests.equalizer.linkage.truth import calibration, readings
@@ -35,14 +36,64 @@ def test_it_is_recognised(path):
     assert found.problems == () and found.kind.startswith("calibration of the linkage of invented, 185 positions")
 
 
-def test_a_changed_byte_is_noticed(path):
+@pytest.fixture
+def no_library(monkeypatch):
+    """The HDF5 library, which may hang on a damaged file, must not see it."""
+
+    def opened(*arguments, **named):
+        raise AssertionError("the library was asked")
+
+    monkeypatch.setattr(h5py, "File", opened)
+
+
+def test_a_changed_byte_is_noticed_by_the_array_s_own_check_sum_too(path):
     with h5py.File(path) as file:
-        offset = file["inertia_kg"].id.get_chunk_info(0).byte_offset
+        offset = SEAL_BYTES + file["inertia_kg"].id.get_chunk_info(0).byte_offset
     content = bytearray(path.read_bytes())
     content[offset + 100] ^= 1
-    path.write_bytes(content)
-    with pytest.raises(UnusableFileError):
+    path.write_bytes(with_seal(bytes(content)))
+    with pytest.raises(UnusableFileError, match="can be read"):
         read_calibration(path)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_mutated_files_are_refused_at_once_and_never_reach_the_hdf5_library(path, no_library, seed):
+    random, sound = np.random.default_rng(seed), path.read_bytes()
+    for _ in range(40):
+        mutated = bytearray(sound)
+        for place in random.integers(
+            SEAL_BYTES if random.random() < 0.9 else 0, len(sound), random.choice([1, 1, 4, 30])
+        ):
+            mutated[place] ^= 1 << int(random.integers(8))
+        del mutated[int(random.choice([len(sound), random.integers(SEAL_BYTES, len(sound))])) :]
+        path.write_bytes(mutated)
+        if bytes(mutated) != sound:
+            with pytest.raises(UnusableFileError, match="damaged, cut off, or changed"):
+                read_calibration(path)
+
+
+def test_a_file_without_its_seal_s_first_byte_is_no_file_without_a_seal(path, no_library):
+    path.write_bytes(b"x" + path.read_bytes()[1:])
+    with pytest.raises(UnusableFileError, match="damaged, cut off, or changed"):
+        read_calibration(path)
+
+
+def test_validate_says_that_a_mutated_file_is_damaged(path):
+    content = bytearray(path.read_bytes())
+    content[2000] ^= 8
+    path.write_bytes(content)
+    assert "damaged, cut off, or changed" in validate_file(path).problems[0]
+
+
+def test_a_calibration_that_another_program_wrote_needs_no_seal(path):
+    path.write_bytes(path.read_bytes()[SEAL_BYTES:])
+    assert read_calibration(path).device == "invented"
+
+
+def test_other_readers_of_hdf5_read_past_the_seal(path):
+    with h5py.File(path) as file:
+        assert file.userblock_size == SEAL_BYTES
+        assert file.attrs["format"] == "hapteq-calibration"
 
 
 @pytest.mark.parametrize(
@@ -58,6 +109,7 @@ def test_wrong_arrays_are_refused(path, name, value, said):
     with h5py.File(path, "r+") as file:
         del file[name]
         file[name] = value
+    path.write_bytes(with_seal(path.read_bytes()))
     with pytest.raises(UnusableFileError, match=said):
         read_calibration(path)
 
@@ -65,5 +117,6 @@ def test_wrong_arrays_are_refused(path, name, value, said):
 def test_missing_attributes_are_all_named(path):
     with h5py.File(path, "r+") as file:
         del file.attrs["device"], file.attrs["line_deg"]
+    path.write_bytes(with_seal(path.read_bytes()))
     with pytest.raises(UnusableFileError, match="'device' is missing.*'line_deg' is missing"):
         read_calibration(path)

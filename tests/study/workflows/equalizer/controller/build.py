@@ -8,7 +8,7 @@ import numpy as np
 from equalizer.plant.identified_model import IdentifiedModel
 from study.store.formats.identified_model_file import write_identified_model
 
-STRICT = ("-O2", "-Wall", "-Wextra", "-Werror", "-pedantic")
+STRICT = ("-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 STAND_INS = Path(__file__).parent / "stand_ins"
 CHANNELS = ("fx", "fy", "fz"), ("ax", "ay", "az")
 

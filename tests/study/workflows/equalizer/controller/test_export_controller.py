@@ -33,6 +33,15 @@ def test_it_compiles_without_a_warning_and_agrees_with_python(vendor, tmp_path, 
     assert re.search(r"a tick: transient \d+ ns, stream \d+ ns", done.stdout)
 
 
+def test_the_measured_tick_of_the_page_is_below_a_microsecond():
+    """A figure with its command, not a timed assertion: a busy machine says nothing about the code."""
+    page = (Path(__file__).parents[5] / "docs" / "controller.md").read_text("utf-8")
+    assert "python tests/benchmarks/bench_controller.py" in page
+    measured = dict(re.findall(r"^\| (transient|stream) \| (\d+) ns \|", page, re.MULTILINE))
+    assert sorted(measured) == ["stream", "transient"]
+    assert all(0 < int(each) <= 1000 for each in measured.values())
+
+
 @pytest.mark.parametrize(
     ("table", "share"), [("hapteq_gains", 0.05), ("hapteq_ahead", 0.0), ("hapteq_low_filter", 0.0)]
 )

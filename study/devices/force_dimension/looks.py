@@ -1,0 +1,138 @@
+"""What the two halves of a tick share: their cells, their codes, and the look at the device that comes now and then."""
+
+import math
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.devices.force_dimension.handle import (
+    CALIBRATED_PLACE,
+    FORCE_ON_PLACE,
+    OFF_CAUSE_PLACE,
+    POWERED_PLACE,
+    UNCALIBRATED_CAUSE,
+    UNPOWERED_CAUSE,
+    WATCHDOG_CAUSE,
+)
+from study.devices.governor.compiling import part
+from study.devices.native import SYSTEM_SIZE, Addresses, call_int, room_for_16, word
+
+ODD_FOR, ODD_SHARE = 5, 0.1
+"""The same of looks at which the device says that it gives another force than it was sent."""
+
+ODD_N, ODD_PART = 0.2, 0.2
+"""So far, and so large a share of what was sent, may the two lie apart: what an acceptance allows."""
+
+POSITION, FORCE, STATUS, BUTTONS, BRAKES, ENABLE, GIVEN, CALLS_SIZE = range(SYSTEM_SIZE, SYSTEM_SIZE + 8)
+"""Behind the places of `native`: addresses of the library's functions, `LIBRARY`."""
+LIBRARY = (
+    "dhdGetPosition", "dhdSetForce", "dhdGetStatus", "dhdGetButtonMask", "dhdSetBrakes", "dhdEnableForce", "dhdGetForce"
+)  # fmt: skip
+
+(
+    NUMBER, CAP_N, DROPS_AFTER_S, READS, REPEATED, TOO_STRONG, PRESSED, SENT_S, SENT_ZERO, WITHHELD_UNTIL_S, CLOSED,
+    LET_GO, FAILED, OFF_CAUSE, REFUSED_N, ODD, TELLS,
+) = range(17)  # fmt: skip
+"""Cells of the driver. REPEATED, TOO_STRONG, ODD: readings, forces and looks beyond their share, as `beyond` counts;
+PRESSED: mask of buttons; OFF_CAUSE, REFUSED_N: for the words about a failure; TELLS: the device once said that it gives
+a force."""
+
+TOLD, SENT = 17, 20
+"""From here on: the force that the device says it gives, x, y, z; and x, y of the last `MEMORY` that it was sent."""
+MEMORY = 3
+CELLS_SIZE = SENT + 2 * MEMORY
+
+OF_LIBRARY = 1
+"""The code of the first function of LIBRARY: a call of it failed. The others follow."""
+(REPEATS, RELEASED, REFUSED, LOCKED, IS_CLOSED, WEAK, GIVES_ANOTHER, FAILED_BEFORE, SAID) = range(
+    OF_LIBRARY + len(LIBRARY), OF_LIBRARY + len(LIBRARY) + 9
+)
+"""SAID: it failed elsewhere, and the words are there."""
+
+
+@part
+def failed(cells: FloatArray, code: int) -> int:
+    """The first failure stays."""
+    if cells[FAILED] == 0.0:
+        cells[FAILED] = code
+    return code
+
+
+@part
+def of_library(cells: FloatArray, function: int) -> int:
+    return failed(cells, OF_LIBRARY + function - SYSTEM_SIZE)
+
+
+@part
+def beyond(count: float, happened: bool, share: float) -> float:
+    """How often something happened beyond this share of all times. A hair below the sum of its steps."""
+    return max(0.0, count + (1.0 if happened else 0.0) - share + 1e-12)
+
+
+@part
+def _number_at(status: int, place: int) -> int:
+    """The int at a place of a status: two are in a word."""
+    return int((word(status, place // 2) >> (32 * (place % 2))) & 0xFFFFFFFF)
+
+
+@part
+def check_on(calls: Addresses, cells: FloatArray) -> int:
+    """Whether it takes forces, or is silent as its watchdog has it after a zero. Else OFF_CAUSE says why not."""
+    status = room_for_16()
+    if call_int(calls[STATUS], (status, np.int32(cells[NUMBER]))) < 0:
+        return of_library(cells, STATUS)
+    cause = _number_at(status, OFF_CAUSE_PLACE)
+    if _number_at(status, FORCE_ON_PLACE) != 0:
+        if _number_at(status, POWERED_PLACE) == 0:
+            cause = UNPOWERED_CAUSE
+        elif _number_at(status, CALIBRATED_PLACE) == 0:
+            cause = UNCALIBRATED_CAUSE
+        else:
+            return 0
+    if cells[SENT_ZERO] != 0.0 and cause == WATCHDOG_CAUSE:
+        return -1
+    if cells[FAILED] == 0.0:
+        cells[OFF_CAUSE] = cause
+    return failed(cells, RELEASED)
+
+
+@part
+def note_sent(cells: FloatArray, x: float, y: float) -> None:
+    for place in range(SENT + 2 * MEMORY - 1, SENT + 1, -1):
+        cells[place] = cells[place - 2]
+    cells[SENT], cells[SENT + 1] = x, y
+
+
+@part
+def _gives_another(cells: FloatArray) -> bool:
+    """Whether TOLD is far from each of the last forces that were sent: what it tells may be a tick or two old. Only the
+    horizontal part: the vertical one may hold up the device's own weight."""
+    for k in range(MEMORY):
+        x, y = cells[SENT + 2 * k], cells[SENT + 2 * k + 1]
+        apart = math.hypot(cells[TOLD] - x, cells[TOLD + 1] - y)
+        if apart <= ODD_N + ODD_PART * math.hypot(x, y):
+            return False
+    return True
+
+
+@part
+def _check_given(calls: Addresses, cells: FloatArray) -> int:
+    """A device that never tells any force, or cannot, is not judged by it: its acceptance was refused."""
+    place = cells.ctypes.data + 8 * TOLD
+    asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
+    if call_int(calls[GIVEN], asked) < 0:
+        return 0
+    if cells[TOLD] != 0.0 or cells[TOLD + 1] != 0.0:
+        cells[TELLS] = 1.0
+    cells[ODD] = beyond(cells[ODD], cells[TELLS] != 0.0 and _gives_another(cells), ODD_SHARE)
+    return 0 if cells[ODD] < ODD_FOR * (1.0 - ODD_SHARE) else failed(cells, GIVES_ANOTHER)
+
+
+@part
+def look(calls: Addresses, cells: FloatArray) -> int:
+    pressed = call_int(calls[BUTTONS], (np.int32(cells[NUMBER]),))
+    if pressed == -1:  # no device has 32 buttons
+        return of_library(cells, BUTTONS)
+    cells[PRESSED] = pressed & 0xFFFFFFFF
+    code = max(0, check_on(calls, cells))
+    return code if code != 0 else _check_given(calls, cells)
