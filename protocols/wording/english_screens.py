@@ -191,6 +191,7 @@ SCREENS: dict[str, str] = {
     "elapsed_s": "{seconds} s so far",
     "elapsed_min": "{minutes} min {seconds} s so far",
     "check_title": "Device check: {device}",
+    "for_experimenter": "These lines are for the experimenter.",
     "check_look": "Something needs a look. Press c to check again, or g to go on all the same.",
     "check_ready": "The device is ready.",
     "check_ready_warning": "The device is ready; mind the warning above.",

@@ -19,6 +19,7 @@ from study.session.views.form_views import FormKind
 from study.session.views.forms import form_of
 from study.session.views.views import (
     DemoMenu,
+    DeviceFinding,
     DeviceReport,
     Goodbye,
     HandleView,
@@ -103,7 +104,9 @@ SCREENS = {
     "note": lambda words: NoteScreen(adverse=True, words=words),
     "withdrawal": lambda words: ConfirmWithdrawal(words),
     "preparing": lambda words: PreparingScreen(words["preparing_device"], words=words),
-    "device": lambda words: DeviceCheckScreen(DeviceReport("omega.3", True, ()), words),
+    "device": lambda words: DeviceCheckScreen(
+        DeviceReport("simulated omega.3", True, (DeviceFinding("Handle", "0.1 mm", True),)), words
+    ),
     "instructions": lambda words: InstructionsScreen(Welcome("Titel", PICTURE, 5, 1, "omega.3", True, 0), words=words),
 }
 
