@@ -133,9 +133,9 @@ def test_the_rest_of_it_too(told):
     told.type("x", "c", "")
     display.device_checked(DeviceReport("simulated omega.3", True, (DeviceFinding("Handle", "0.1 mm", True),)))
     assert "simulated" not in told.out.getvalue()
-    told.check("for_experimenter", "practice_hard", "runs_left_1", "line_pause_keys", "withdraw_all", "nothing_erased", "line_noted",
-               "saved_1", "void_title", "line_finished_1", "excluded", "excluded_kept", "fact_hands_off",
-               "check_ready")  # fmt: skip
+    told.check("for_experimenter", "practice_hard", "runs_left_1", "line_pause_keys", "withdraw_all", "nothing_erased",
+               "line_noted", "saved_1", "void_title", "line_finished_1", "excluded", "excluded_kept",
+               "fact_hands_off", "check_ready")  # fmt: skip
 
 
 def test_forms_are_answered_in_the_language_by_word_letter_or_number(told, spoken):
