@@ -13,6 +13,12 @@ def identify(
     recordings: Annotated[list[Path], typer.Argument(help="Recordings of sweeps or multisines, all at one place.")],
     out: Annotated[Path, typer.Option(help="The model to write, MODEL.h5.")],
     band: Annotated[tuple[float, float], typer.Option(help="Band to fit, low and high in hertz.")] = (5.0, 35.0),
+    limit_from: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="ANOVA.json", help="Analysis of a study, whose direction limit is the upper end of the band."
+        ),
+    ] = None,
     order: Annotated[int, typer.Option(min=2, max=200, help="Number of states; even.")] = 26,
     smooth: Annotated[
         bool | None,
@@ -35,10 +41,15 @@ def identify(
 ) -> None:
     """Fit a stable model to the band, test it on what was kept for a test, and write it."""
     from study.cli.progress import bar
+    from study.workflows.equalizer.direction_limit import band_of_study
     from study.workflows.equalizer.identified_summary import summary, summary_lines
     from study.workflows.equalizer.identify_model import IdentifyPlan, check_free, identify_model
     from study.workflows.equalizer.report_identification import report_identification
 
+    if limit_from is not None:
+        of_study = band_of_study(limit_from, band[0])
+        band = of_study.band_hz
+        typer.echo(f"Note: {of_study.told}", err=True)
     plan = IdentifyPlan(tuple(recordings), out, band, order, smooth, with_spring, physics, longest_decay)
     check_free(out)
     with bar("Identifying (%)", total=100) as show:
