@@ -34,12 +34,6 @@ def signed_number(value: float, digits: int = 2) -> str:
     return typeset(f"{value:+.{digits}f}")
 
 
-CUT_NOTE = (
-    "cut: the cap cut off peaks of the staircase. On a stronger device the value would be higher; a bound it is not, "
-    "the true threshold may lie to either side."
-)
-
-
 def mark_cut(value: float | None, cut: bool, digits: int = 2) -> str:
     """The value, followed by "cut" where the cap cut into it."""
     return f"{number(value, digits)} cut" if cut and value is not None else number(value, digits)

@@ -80,10 +80,16 @@ def _legend(rule: StaircaseRule) -> list[Line2D]:
     return [
         Line2D([], [], marker="o", color=BLUE, markersize=4, linewidth=0, label="right"),
         Line2D([], [], marker="x", color=VERMILLION, linewidth=0, label="wrong"),
-        _ring(BLACK, f"reversal, one of the last {rule.averaged_reversals}"),
-        _ring(GREY, "reversal, not averaged"),
+        *([] if rule.is_bayesian else _rings(rule)),
         Line2D([], [], color=BLACK, linewidth=1.1, label="threshold"),
         Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {rule.cap_n:g} N"),
+    ]
+
+
+def _rings(rule: StaircaseRule) -> list[Line2D]:
+    return [
+        _ring(BLACK, f"reversal, one of the last {rule.averaged_reversals}"),
+        _ring(GREY, "reversal, not averaged"),
     ]
 
 

@@ -16,6 +16,7 @@ from analysis.psychophysics.hierarchy.answers import count_answers
 from analysis.psychophysics.hierarchy.observed_shares import BIN_DB
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
+from analysis.threshold_words import threshold_words
 
 
 def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult] = ()) -> tuple[Picture, ...]:
@@ -73,7 +74,7 @@ def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
             title="Thresholds in every unit that was measured",
             caption="The same runs in each panel, people joined by lines; bar: median of what is shown. Hollow markers "
             "with an arrow are cut by the cap: medians over them are too low. Acceleration and displacement are what "
-            "was measured along the direction in the trials of the averaged reversals."
+            f"was measured along the direction in {threshold_words(analysis.protocol.staircase).measured_in}."
             + (
                 " Above detection: over the level from which the same participant felt the vibration at all."
                 if tables[-1].quantity == "above_detection_db"
@@ -108,8 +109,7 @@ def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
         name="psychometric",
         title="Psychometric functions, all people together",
         caption=f"{points}Levels are taken re each person's threshold by the model of all answers, whose curve is "
-        "drawn. A staircase stops going down where answers happen to be wrong, so the lowest points lie somewhat "
-        "below the curve of a model that is right.",
+        f"drawn. {threshold_words(analysis.protocol.staircase).levels}",
         figure=draw_people_curves(answers, primary),
     )
     return [
@@ -153,9 +153,8 @@ def _staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
     return [
         Picture(
             name=f"staircases-{index}-{_file_name(subject)}",
-            title=f"Staircases of {subject}",
-            caption="Level of every counted trial, right and wrong answers, and the reversals; the black ones are "
-            "averaged into the threshold (solid line).",
+            title=f"{'Levels' if analysis.protocol.staircase.is_bayesian else 'Staircases'} of {subject}",
+            caption=threshold_words(analysis.protocol.staircase).track,
             figure=draw_staircases(
                 [run for run in analysis.runs if run.subject == subject], analysis.protocol.staircase
             ),

@@ -7,11 +7,13 @@ from typing import Literal
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
+from analysis.threshold_words import capitalised, threshold_words
 from analysis.wording import conjoin
 from protocols.definition.declared_analysis import AnalysisSettings
+from protocols.definition.staircase_rule import StaircaseRule
 
 UNSETTLED = "The search ended before it had settled: do not use these numbers."
-TUKEY = "Reversal means in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
+TUKEY = "{means} in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
 NO_MODEL = "The model needs answers of two participants, at two frequencies."
 NO_DIFFERENCE = "It needs two participants, with differences that are not all equal."
 NO_PAIR = "It needs thresholds at both frequencies, and a spread within frequencies."
@@ -59,14 +61,22 @@ def declared_result(
     comparisons: Comparisons,
     table: ThresholdTable,
     left_out: Sequence[str],
+    rule: StaircaseRule,
 ) -> DeclaredResult:
-    """primary: with the contrast of `declared`. table: reversal means in newtons, from which `comparisons` come."""
+    """primary: with the contrast of `declared`. table: thresholds in newtons, from which `comparisons` come. rule: of
+    their runs."""
     results = []
     if declared.contrast_hz:
         pair_hz = (declared.contrast_hz[0], declared.contrast_hz[1])
         results = [
             _by_model(pair_hz, primary, declared.primary == "hierarchical"),
-            _as_published(pair_hz, comparisons, table, declared.primary == "published"),
+            _as_published(
+                pair_hz,
+                comparisons,
+                table,
+                declared.primary == "published",
+                TUKEY.format(means=capitalised(threshold_words(rule).means)),
+            ),
         ]
         results.sort(key=lambda result: not result.declared)
     return DeclaredResult(
@@ -117,13 +127,13 @@ def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[
 
 
 def _as_published(
-    pair_hz: tuple[float, float], comparisons: Comparisons, table: ThresholdTable, declared: bool
+    pair_hz: tuple[float, float], comparisons: Comparisons, table: ThresholdTable, declared: bool, meaning: str
 ) -> ContrastResult:
     first, second = (frequency_name(frequency_hz) for frequency_hz in pair_hz)
     groups = table.groups()
     sizes = [sum(value is not None for value in groups.get(name, ())) for name in (first, second)]
     people = (sizes[0], sizes[1])
-    notes = (TUKEY, *filter(None, [table.coverage]))
+    notes = (meaning, *filter(None, [table.coverage]))
     pair = next((pair for pair in comparisons.pairs if {pair.first, pair.second} == {first, second}), None)
     if pair is None:
         return ContrastResult("published", declared, "N", people, None, None, None, None, (NO_PAIR,))

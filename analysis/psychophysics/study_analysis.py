@@ -167,7 +167,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
         mean_contrasts=means,
         tobit=tobit,
         declared=declaration_text(protocol.analysis),
-        declared_result=declared_result(protocol.analysis, primary, comparisons, table, left_out),
+        declared_result=declared_result(protocol.analysis, primary, comparisons, table, left_out, rule),
         compared=comparison_text(primary, means, comparisons, table, rule),
         warnings=(
             *study_warnings(tested, rows, table, protocol),

@@ -8,6 +8,7 @@ from analysis.psychophysics.catch_trials import CatchTally, wilson_interval
 from analysis.psychophysics.detection import directions_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import RunEnd, Threshold
+from analysis.threshold_words import threshold_words
 from analysis.wording import conjoin, signed_number
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.definition.study_protocol import StudyProtocol
@@ -38,7 +39,7 @@ def study_warnings(
         _stopped_warning(rows, protocol.staircase),
         _incomplete_warning(rows, protocol.staircase),
         _missing_warning(table),
-        _censored_warning(table, protocol.staircase.cap_n),
+        _censored_warning(table, protocol.staircase),
         _few_participants_warning(table),
         _unequal_sizes_warning(table),
         _chance_warning(rows),
@@ -73,9 +74,7 @@ def side_warnings(
 
 def _incomplete_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     cut = [
-        f"{_run_text(row)} ({row.trials} trials)"
-        if rule.is_bayesian
-        else f"{_run_text(row)} ({row.reversals} of {rule.reversals} reversals)"
+        f"{_run_text(row)} ({_progress(row, rule)})"
         for row in rows
         if not row.complete and row.ended is not RunEnd.TRIAL_LIMIT
     ]
@@ -84,7 +83,7 @@ def _incomplete_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
 
 def _stopped_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     stopped = [
-        f"{_run_text(row)} ({row.reversals} of {rule.reversals} reversals, {row.trials_at_cap} trials at the cap)"
+        f"{_run_text(row)} ({_progress(row, rule)}, {row.trials_at_cap} trials at the cap)"
         for row in rows
         if row.ended is RunEnd.TRIAL_LIMIT
     ]
@@ -97,12 +96,19 @@ def _stopped_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     )
 
 
+def _progress(row: Threshold, rule: StaircaseRule) -> str:
+    """How far a run came."""
+    if rule.is_bayesian:
+        return f"{row.trials} trials"
+    return f"{row.reversals} of {rule.reversals} reversals"
+
+
 def _missing_warning(table: ThresholdTable) -> str:
     gaps = [f"{subject} at {frequency:g} Hz" for subject, frequency in table.gaps()]
     return f"No threshold for {conjoin(gaps)}." if gaps else ""
 
 
-def _censored_warning(table: ThresholdTable, cap_n: float) -> str:
+def _censored_warning(table: ThresholdTable, rule: StaircaseRule) -> str:
     cut = [
         f"{subject} at {frequency:g} Hz"
         for subject, row in zip(table.subjects, table.censored, strict=True)
@@ -112,7 +118,7 @@ def _censored_warning(table: ThresholdTable, cap_n: float) -> str:
     if not cut:
         return ""
     return (
-        f"{_count_text(cut, 'threshold')} cut by the cap of {cap_n:g} N, which cut off peaks of the staircase: "
+        f"{_count_text(cut, 'threshold')} cut by the cap of {rule.cap_n:g} N, {threshold_words(rule).cut}: "
         f"{conjoin(cut)}. As in the published analysis they enter means and tests as plain numbers, so means near the "
         "cap are too low, differences towards it too small, and intervals and effect sizes without coverage."
     )

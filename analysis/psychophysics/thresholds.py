@@ -18,7 +18,9 @@ class RunEnd(StrEnum):
     """Reason for the end of a run."""
 
     REVERSALS = "reversals"
-    """All reversals of the rule, or all that Psi was to find out: there is a threshold."""
+    """All reversals of the rule: there is a threshold."""
+    PSI = "psi"
+    """All trials of the Psi method, or its wanted spread: there is a threshold."""
     TRIAL_LIMIT = "trial_limit"
     """The protocol's `trial_limit`. The run has no threshold, and is more often that of a high threshold: under a
     limit of 100 trials 58 % of guessers and 0.1 % of people with a threshold of 1 N end so."""
@@ -179,7 +181,7 @@ def is_censored(cap_reversals: int) -> bool:
 
 def _run_end(run: Run, rule: StaircaseRule) -> RunEnd:
     if run.complete:
-        return RunEnd.REVERSALS
+        return RunEnd.PSI if rule.is_bayesian else RunEnd.REVERSALS
     return RunEnd.TRIAL_LIMIT if is_finished(rule, run.state) else RunEnd.UNFINISHED
 
 

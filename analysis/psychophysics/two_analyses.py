@@ -8,6 +8,7 @@ from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
+from analysis.threshold_words import capitalised, threshold_words
 from analysis.wording import conjoin, p_text, signed_number
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
@@ -65,7 +66,9 @@ def comparison_text(
     missing = [f"{frequency_hz:g} Hz" for frequency_hz in primary.missing_hz]
     left_out = f"The model leaves {conjoin(missing)} out, where there is no answer yet." if missing else ""
     cut = [NEAR_CAP, *coverage_notes(("means", "tukey", "one-way"), table, rule)] if table.cut else []
-    return " ".join(filter(None, [left_out, _sizes_text(primary, means), _verdict_text(primary, comparisons), *cut]))
+    return " ".join(
+        filter(None, [left_out, _sizes_text(primary, means, rule), _verdict_text(primary, comparisons), *cut])
+    )
 
 
 def coverage_notes(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
@@ -76,13 +79,14 @@ def coverage_notes(analyses: Sequence[str], table: ThresholdTable, rule: Stairca
     return tuple(filter(None, (coverage_sentence(MEASURED, name) for name in analyses)))
 
 
-def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast]) -> str:
-    """Difference between the results by the model and by reversal means, as text."""
+def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: StaircaseRule) -> str:
+    """Difference between the results by the model and by the runs' thresholds, as text."""
+    named = threshold_words(rule).means
     by_frequency = {contrast.frequency_hz: contrast for contrast in means}
     against = f"{primary.frequencies_hz[0]:g} Hz"
     pairs = [(contrast, by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]
     if not any(mean for _, mean in pairs):
-        return f"Reversal means tell no difference to {against} yet that could be held against the model's."
+        return f"{capitalised(named)} tell no difference to {against} yet that could be held against the model's."
     apart = [
         f"at {contrast.frequency_hz:g} Hz {signed_number(contrast.difference_db, 1)} dB against "
         f"{signed_number(mean.difference_db, 1)} dB"
@@ -90,8 +94,8 @@ def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast]) -> str:
         if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB
     ]
     if apart:
-        return f"Differences to {against} by the model and by reversal means are apart: {conjoin(apart)}."
-    return f"Differences to {against} by the model and by reversal means agree within {NOTABLE_DB:g} dB."
+        return f"Differences to {against} by the model and by {named} are apart: {conjoin(apart)}."
+    return f"Differences to {against} by the model and by {named} agree within {NOTABLE_DB:g} dB."
 
 
 def _verdict_text(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:

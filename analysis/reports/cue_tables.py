@@ -7,7 +7,9 @@ from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB, USUAL_NOI
 from analysis.psychophysics.cues.cue_findings import CueFinding, cue_warnings, gap_text
 from analysis.psychophysics.cues.delivered_cues import CueGap
 from analysis.reports.page import Section, Table
+from analysis.threshold_words import threshold_words
 from analysis.wording import NONE, conjoin, number, p_value, signed_number
+from protocols.definition.staircase_rule import StaircaseRule
 
 _MEANING = (
     "A device seldom delivers both directions alike. What else differs can be noticed in place of the direction: how "
@@ -16,12 +18,12 @@ _MEANING = (
 )
 
 
-def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap]) -> list[Section]:
+def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:
     """Empty where no trial was measured."""
     if not found:
         return []
     sentences = (*(cue_warnings(found) or (_nothing(found),)), *filter(None, [gap_text(gaps)]))
-    tables = (_ability_table(found), _answer_table(found))
+    tables = (_ability_table(found, threshold_words(rule).sensitivity), _answer_table(found))
     return [Section("Was direction the cue?", paragraphs=(_MEANING, *sentences), tables=tables)]
 
 
@@ -39,7 +41,7 @@ def _nothing(found: Sequence[CueFinding]) -> str:
     )
 
 
-def _ability_table(found: Sequence[CueFinding]) -> Table:
+def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
     return Table(
         caption="What each cue alone could do",
         header=(
@@ -57,12 +59,11 @@ def _ability_table(found: Sequence[CueFinding]) -> Table:
         ),
         notes=(
             "Difference: first direction minus second, by their angles; medians over participants, and the largest of "
-            "any. Spread: standard deviation over trials of one direction at one level of the staircase, roving "
-            "included. d' = "
+            "any. Spread: standard deviation over trials of one direction at one level, roving included. d' = "
             "difference over internal noise and spread together, for three internal noises; 1 is one just noticeable "
             "difference.",
             f"Noticeable: shown, by a 95 % interval of the difference, to reach d' 1 at an internal noise of "
-            f"{USUAL_NOISE_DB:g} dB. A staircase holds d' of the answers near 1.6 for any cue.",
+            f"{USUAL_NOISE_DB:g} dB. {sensitivity}",
         ),
     )  # fmt: skip
 

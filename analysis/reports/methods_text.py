@@ -39,6 +39,12 @@ _STATISTICS = (
 )
 
 
+_SENSITIVITY = (
+    "Sensitivity d' and criterion are those of one-interval identification over all trials of a run, with the "
+    "log-linear correction; the criterion is positive for a liking of the answer 2."
+)
+
+
 def methods_text(protocol: StudyProtocol) -> tuple[str, ...]:
     """One paragraph each: task, stimulus, schedule, staircase, threshold, what stood beside it, statistics."""
     rule = protocol.staircase
@@ -103,7 +109,8 @@ def _schedule(protocol: StudyProtocol) -> str:
     training = conjoin([f"{frequency:g} Hz" for frequency in protocol.training.frequencies_hz])
     rest = f", at least {protocol.rests.after_run_s:g} s apart" if protocol.rests.after_run_s else ""
     return (
-        f"The frequencies were {frequencies} Hz, one whole staircase each, {_ORDERS[protocol.schedule.order]}{rest}. "
+        f"The frequencies were {frequencies} Hz, one whole {_track(protocol.staircase)} each, "
+        f"{_ORDERS[protocol.schedule.order]}{rest}. "
         + (f"Training came first ({training}) and enters no result." if training else "There was no training.")
     )
 
@@ -140,16 +147,14 @@ def _threshold(rule: StaircaseRule) -> str:
         return (
             "The threshold is the mean of its posterior in dB, at most the cap. It was recomputed from the answers, "
             "and every level on record was checked against the rule. It is marked as cut by the cap where it lies "
-            f"above it with a probability over {MAYBE_ABOVE:g}."
+            f"above it with a probability over {MAYBE_ABOVE:g}. {_SENSITIVITY}"
         )
     return (
         "The threshold is the arithmetic mean, in newtons, of the levels at the last "
         f"{rule.averaged_reversals} reversals. It was recomputed from the answers, and every level on record was "
         "checked against the rule. It is marked as cut by the cap when at least one of these reversals is a peak at "
         "the cap, which a stronger device would have let rise further; a bound of the true threshold it is not. "
-        "Sensitivity d' and criterion are those of "
-        "one-interval identification over all trials of a run, with the log-linear correction; the criterion is "
-        "positive for a liking of the answer 2."
+        f"{_SENSITIVITY}"
     )
 
 
@@ -174,15 +179,20 @@ def _side_procedures(protocol: StudyProtocol) -> tuple[str, ...]:
     if catch.one_in:
         sentences.append(
             f"One in {catch.one_in} trials of a test run, at a place drawn by lot, was a catch trial at "
-            f"{protocol.staircase.cap_n:g} N. It moved no staircase and enters no threshold."
+            f"{protocol.staircase.cap_n:g} N. It changed no level of the {_track(protocol.staircase)} and enters no "
+            "threshold."
         )
     if detection.frequencies_hz:
         sentences.append(
             f"Detection was tested after the test runs, at {_hz(detection.frequencies_hz)}: one of two intervals of "
             f"{detection.interval_s:g} s, {detection.gap_s:g} s apart, held a stimulus, and the participant said "
-            f"which. The staircase was the same, from {detection.start_n:g} N."
+            f"which. The rule of the levels was the same, from {detection.start_n:g} N."
         )
     return (" ".join(sentences),) if sentences else ()
+
+
+def _track(rule: StaircaseRule) -> str:
+    return "run" if rule.is_bayesian else "staircase"
 
 
 def levels_words(settings: DemoSettings | PracticeSettings) -> str:

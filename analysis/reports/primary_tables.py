@@ -10,6 +10,7 @@ from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, newto
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.two_analyses import coverage_notes
 from analysis.reports.page import Section, Table
+from analysis.threshold_words import threshold_words
 from analysis.wording import NONE, number, p_text, p_value, signed_number
 
 MEANING = (
@@ -30,8 +31,8 @@ SINGLE_MEANING = (
     "answers only): no size, a one-sided bound."
 )
 TOBIT_MEANING = (
-    "A mean that the cap cut counts as at least this. A sensitivity analysis: reversal means near the cap are too low "
-    "before they are cut, and a cut mean is no clean bound. Wald's intervals, t with n − 1 degrees of freedom."
+    "A mean that the cap cut counts as at least this. A sensitivity analysis: {too_low}. Wald's intervals, t with "
+    "n − 1 degrees of freedom."
 )
 
 
@@ -39,9 +40,10 @@ def primary_section(analysis: StudyAnalysis) -> Section:
     primary, means = analysis.primary, analysis.mean_contrasts
     if primary is None:
         return _single_section(analysis)
-    by_means = [_contrasts("Differences by reversal means (dB)", means, (), _measured(analysis, "means"))]
+    words = threshold_words(analysis.protocol.staircase)
+    by_means = [_contrasts(f"Differences by {words.means} (dB)", means, (), _measured(analysis, "means"))]
     if analysis.tobit:
-        notes = (TOBIT_MEANING, *_measured(analysis, "tobit"))
+        notes = (TOBIT_MEANING.format(too_low=words.too_low), *_measured(analysis, "tobit"))
         by_means.append(_contrasts("Sensitivity: differences by Tobit's model (dB)", analysis.tobit, (), notes))
     model = _measured(analysis, "model")
     return Section(

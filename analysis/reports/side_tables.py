@@ -7,7 +7,8 @@ from analysis.psychophysics.equalized_delivery import deliveries
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import levels_words
 from analysis.reports.page import Table
-from analysis.wording import CUT_NOTE, NONE, mark_cut, number, signed_number
+from analysis.threshold_words import threshold_words
+from analysis.wording import NONE, mark_cut, number, signed_number
 from protocols.procedure.staircase import to_db
 
 
@@ -24,21 +25,22 @@ def detection_table(analysis: StudyAnalysis) -> Table:
         header=("Participant", "Frequency", "Felt from", "Direction told from", "Direction above detection (dB)"),
         rows=tuple(rows),
         notes=(
-            f"{CUT_NOTE} –: no completed run. The last column is given where both are "
-            "thresholds. Near 0 dB the vibration has a direction as soon as it is felt; far above, it is felt "
-            "long before its direction is.",
+            f"{threshold_words(analysis.protocol.staircase).cut_note} –: no completed run. The last column is given "
+            "where both are thresholds. Near 0 dB the vibration has a direction as soon as it is felt; far above, it "
+            "is felt long before its direction is.",
         ),
     )
 
 
 def detection_run_table(analysis: StudyAnalysis) -> Table:
+    turns = () if analysis.protocol.staircase.is_bayesian else ("Reversals",)
     return Table(
         caption="All detection runs",
-        header=("Participant", "Session", "Run", "Hz", "N", "Reversals", "Trials", "% right", "d'", "Criterion"),
+        header=("Participant", "Session", "Run", "Hz", "N", *turns, "Trials", "% right", "d'", "Criterion"),
         rows=tuple(
             (
                 row.subject, row.session, str(row.run), f"{row.frequency_hz:g}",
-                mark_cut(row.threshold_n, row.censored), str(row.reversals), str(row.trials),
+                mark_cut(row.threshold_n, row.censored), *([str(row.reversals)] if turns else []), str(row.trials),
                 number(row.percent_correct, 0), number(row.d_prime), number(row.criterion),
             )
             for row in analysis.detection

@@ -58,7 +58,7 @@ def render_study_report(
         *_results(analysis, by_name),
         *_side_sections(analysis),
         *_delivery(analysis, by_name),
-        *cue_section(analysis.cues, analysis.cue_gaps),
+        *cue_section(analysis.cues, analysis.cue_gaps, analysis.protocol.staircase),
         *_ellipsoids(ellipsoids, by_name),
         *_runs(analysis, pictures),
         Section("Methods", paragraphs=methods_text(analysis.protocol)),
@@ -145,7 +145,7 @@ def _side_sections(analysis: StudyAnalysis) -> list[Section]:
         tables = (detection_table(analysis), detection_run_table(analysis))
         sections.append(Section("Is the vibration felt at all?", paragraphs=(felt,), tables=tables))
     if analysis.catches:
-        steer = "Trials at full level, mixed into the test runs. They moved no staircase and enter no threshold."
+        steer = "Trials at full level, mixed into the test runs. They changed no level of a run and enter no threshold."
         sections.append(Section("Catch trials", paragraphs=(steer,), tables=(catch_table(analysis),)))
     if analysis.practice:
         enter = "Short runs at a fixed level, before the test runs. They enter no result and excluded no participant."

@@ -9,7 +9,8 @@ from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.psychophysics.two_analyses import coverage_notes
 from analysis.reports.page import Table
-from analysis.wording import CUT_NOTE, NONE, count, mark_cut, number, p_value, signed_number
+from analysis.threshold_words import threshold_words
+from analysis.wording import NONE, count, mark_cut, number, p_value, signed_number
 
 
 def threshold_table_text(analysis: StudyAnalysis) -> Table:
@@ -22,7 +23,10 @@ def threshold_table_text(analysis: StudyAnalysis) -> Table:
         caption="Individual thresholds (N)",
         header=("Participant", *(f"{frequency:g} Hz" for frequency in table.frequencies_hz)),
         rows=tuple(rows),
-        notes=(f"{CUT_NOTE} stopped: by the trial limit, without a threshold. –: no completed run.",),
+        notes=(
+            f"{threshold_words(analysis.protocol.staircase).cut_note} stopped: by the trial limit, without a "
+            "threshold. –: no completed run.",
+        ),
     )
 
 
@@ -143,7 +147,16 @@ def within_table(analysis: StudyAnalysis) -> Table:
     )
 
 
+TURNS = "Reversals at the cap: of the averaged ones. Pushes: how often the rule asked for more than the cap."
+
+
 def run_table(analysis: StudyAnalysis) -> Table:
+    by_reversals = not analysis.protocol.staircase.is_bayesian
+    turns: tuple[tuple[str, Callable[[Threshold], str]], ...] = (
+        ("Reversals", lambda row: str(row.reversals)),
+        ("at cap", lambda row: str(row.cap_reversals)),
+    )
+    pushes: tuple[tuple[str, Callable[[Threshold], str]], ...] = (("Pushes", lambda row: str(row.pushes_against_cap)),)
     columns: tuple[tuple[str, Callable[[Threshold], str]], ...] = (
         ("Participant", lambda row: row.subject),
         ("Session", lambda row: row.session),
@@ -153,11 +166,10 @@ def run_table(analysis: StudyAnalysis) -> Table:
         ("dB re 1 N", lambda row: number(row.threshold_db)),
         ("m/s²", lambda row: number(row.threshold_mps2)),
         ("mm", lambda row: number(row.threshold_mm, 3)),
-        ("Reversals", lambda row: str(row.reversals)),
-        ("at cap", lambda row: str(row.cap_reversals)),
+        *(turns if by_reversals else ()),
         ("Trials", lambda row: str(row.trials)),
         ("at cap", lambda row: str(row.trials_at_cap)),
-        ("Pushes", lambda row: str(row.pushes_against_cap)),
+        *(pushes if by_reversals else ()),
         ("Spoiled", lambda row: str(row.spoiled_trials)),
         ("At will", _repeats),
         ("% right", lambda row: number(row.percent_correct, 0)),
@@ -169,8 +181,8 @@ def run_table(analysis: StudyAnalysis) -> Table:
         header=tuple(name for name, _ in columns),
         rows=tuple(tuple(text(row) for _, text in columns) for row in analysis.thresholds),
         notes=(
-            "Reversals at the cap: of the averaged ones. Pushes: how often the rule asked for more than the cap. "
-            "m/s² and mm: as measured at the averaged reversals.",
+            *([TURNS] if by_reversals else []),
+            f"m/s² and mm: as measured in {threshold_words(analysis.protocol.staircase).measured_in}.",
             f"At will: presentations that the participant made void (asked for again, paused, left, answered outside "
             f"the time), with their share; ! {OFTEN_WORDS}.",
             f"Criterion: {CRITERION_WORDS}.",

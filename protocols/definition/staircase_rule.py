@@ -153,8 +153,17 @@ class StaircaseRule:
                     "phases whose reversals add up to the number in reversals",
                 )
             )
-        if self.bayesian.spread_db and not self.is_bayesian:
-            wrong = f"is {self.bayesian.spread_db} dB, but bayesian.trials is 0"
-            problems.append(Problem("bayesian.spread_db", wrong, "0, or a number of trials in bayesian.trials"))
-        refuse(problems)
+        refuse([*problems, *_placement_problems(self)])
         return self
+
+
+def _placement_problems(rule: StaircaseRule) -> list[Problem]:
+    """What of the up-down rule does not go with Psi, and the other way round."""
+    bayesian, problems = rule.bayesian, []
+    if bayesian.spread_db and not rule.is_bayesian:
+        wrong = f"is {bayesian.spread_db} dB, but bayesian.trials is 0"
+        problems.append(Problem("bayesian.spread_db", wrong, "0, or a number of trials in bayesian.trials"))
+    if rule.is_bayesian and rule.initial_one_up_one_down:
+        wrong = "is true, but Psi chooses the levels (bayesian.trials), and there is no reversal to wait for"
+        problems.append(Problem("initial_one_up_one_down", wrong, "false, or 0 in bayesian.trials"))
+    return problems

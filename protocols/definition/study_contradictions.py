@@ -34,6 +34,15 @@ def _levels(protocol: StudyProtocol) -> list[Problem]:
     if protocol.stimulus.rove_db and protocol.staircase.is_bayesian:
         wrong = f"is {protocol.stimulus.rove_db:g} dB, but Psi takes the levels of its answers as they are planned"
         problems.append(Problem("stimulus.rove_db", wrong, "0, or 0 in staircase.bayesian.trials"))
+    trials = protocol.staircase.bayesian.trials
+    limits = {
+        "staircase.trial_limit": protocol.staircase.trial_limit,
+        "detection.trial_limit": protocol.detection.trial_limit if protocol.detection.frequencies_hz else 0,
+    }
+    for key, limit in limits.items():  # of a training run none is wrong: it needs no threshold
+        if 0 < limit < trials:
+            wrong = f"is {limit}, and would end every such run before the {trials} trials of Psi"
+            problems.append(Problem(key, wrong, f"0, or at least {trials}, as in staircase.bayesian.trials"))
     levels = {
         "demo.level_n": _highest_n(protocol.demo),
         "practice.level_n": _highest_n(protocol.practice) if protocol.practice.frequencies_hz else 0.0,

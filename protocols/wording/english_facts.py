@@ -55,6 +55,7 @@ FACTS: dict[str, str] = {
     "fact_interval": "Interval {number}",
     "fact_no_question": "Nothing to answer: the device is measured",
     "fact_no_position": "The device does not say where its handle is.",
+    "fact_simulated_device": "simulated {device}",
     "fact_hold_there": "Hold it there.",
     "fact_bring_back": "Bring the handle {distance} mm back to the centre.",
     "fact_hands_off": "Hands off: the reference plays for {seconds} s.",

@@ -29,6 +29,8 @@ SCREENS: dict[str, str] = {
     "key_write": "Write it",
     "key_check_again": "Check again",
     "key_go_on_anyway": "Go on all the same",
+    "key_quit": "Leave hapteq",
+    "key_enter": "Enter",
     "key_space": "Space",
     # Keys in sentences.
     "keys_digits": "1 or 2",
@@ -191,6 +193,14 @@ SCREENS: dict[str, str] = {
     "elapsed_s": "{seconds} s so far",
     "elapsed_min": "{minutes} min {seconds} s so far",
     "check_title": "Device check: {device}",
+    "stop_title": "Letting go",
+    "stop_told": "The device program was told to take the force away and to end the sitting. It answers in a moment.",
+    "stop_unheard_title": "The stop was not answered",
+    "stop_unheard": "The device program has not answered for {seconds} s.",
+    "stop_safe": "Every answer that was given is on disk.",
+    "stop_do_now": "Take the hand off the handle and switch the device off. Then leave hapteq: that ends the device "
+    "program. The session can be resumed.",
+    "for_experimenter": "These lines are for the experimenter.",
     "check_look": "Something needs a look. Press c to check again, or g to go on all the same.",
     "check_ready": "The device is ready.",
     "check_ready_warning": "The device is ready; mind the warning above.",

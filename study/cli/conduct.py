@@ -56,12 +56,13 @@ def begin(
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
     _confirm_free_handle(sitter.observer, device, sitter.hands_off)
-    _say_wait(sitter.observer)
+    words = words_of(plan.session.protocol)
+    _say_wait(sitter.observer, words)
     in_real_time = sitter.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock()
-    words = words_of(plan.session.protocol)
     with _participant(sitter.observer, plan.session.seed, sitter.keys, clock, words) as participant:
         end = conduct_new(plan.session, device, participant)
+    _say_whose(sitter.observer, words)
     show(end_sitting(end, RealClock().utc()), as_json)
 
 
@@ -91,9 +92,11 @@ def go_on(
     _confirm_free_handle(opened.observer, device, hands_off)
     in_real_time = opened.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock.not_before(state.sitting.last.utc)
-    _say_wait(opened.observer)
-    with _participant(opened.observer, opened.seed, keys, clock, words_of(state.protocol)) as participant:
+    words = words_of(state.protocol)
+    _say_wait(opened.observer, words)
+    with _participant(opened.observer, opened.seed, keys, clock, words) as participant:
         end = conduct_resumed(folder, device, participant)
+    _say_whose(opened.observer, words)
     show(end_sitting(end, RealClock().utc()), as_json)
 
 
@@ -116,9 +119,15 @@ def _participant(
         yield make_simulated_participant(observer, seed, clock, on_question=show_question)
 
 
-def _say_wait(observer: str | None) -> None:
+def _say_wait(observer: str | None, words: Words) -> None:
     if observer is None:
-        typer.echo("Preparing the device (some ten seconds the first time) …", err=True)
+        typer.echo(words["preparing_device"], err=True)
+
+
+def _say_whose(observer: str | None, words: Words) -> None:
+    """Results are not for the participant, who may still sit there."""
+    if observer is None:
+        typer.echo(f"\n{words['for_experimenter']}", err=True)
 
 
 def code_of_simulated(observer: str) -> str:

@@ -8,18 +8,26 @@ import typer
 
 from study.cli.results import JsonOption
 
+LimitOption = Annotated[
+    Path | None,
+    typer.Option(metavar="ANOVA.json", help="Analysis of a study, whose direction limit is the upper end of the band."),
+]
+
+SmoothOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--smooth/--no-smooth", help="Fit to local averages over lines [default: where they scatter beyond noise]."
+    ),
+]
+
 
 def identify(
     recordings: Annotated[list[Path], typer.Argument(help="Recordings of sweeps or multisines, all at one place.")],
     out: Annotated[Path, typer.Option(help="The model to write, MODEL.h5.")],
     band: Annotated[tuple[float, float], typer.Option(help="Band to fit, low and high in hertz.")] = (5.0, 35.0),
+    limit_from: LimitOption = None,
     order: Annotated[int, typer.Option(min=2, max=200, help="Number of states; even.")] = 26,
-    smooth: Annotated[
-        bool | None,
-        typer.Option(
-            "--smooth/--no-smooth", help="Fit to local averages over lines [default: where they scatter beyond noise]."
-        ),
-    ] = None,
+    smooth: SmoothOption = None,
     with_spring: Annotated[
         bool, typer.Option("--with-spring", help="Take the spring as a part of the device.")
     ] = False,
@@ -39,7 +47,8 @@ def identify(
     from study.workflows.equalizer.identify_model import IdentifyPlan, check_free, identify_model
     from study.workflows.equalizer.report_identification import report_identification
 
-    plan = IdentifyPlan(tuple(recordings), out, band, order, smooth, with_spring, physics, longest_decay)
+    chosen_hz = _band(band, limit_from)
+    plan = IdentifyPlan(tuple(recordings), out, chosen_hz, order, smooth, with_spring, physics, longest_decay)
     check_free(out)
     with bar("Identifying (%)", total=100) as show:
         device = identify_model(plan, lambda share: show(round(100 * share)))
@@ -50,3 +59,14 @@ def identify(
         with bar("Report (%)", total=100) as show:
             page = report_identification(device, report, lambda share: show(round(100 * share)))
         typer.echo(f"Report: {page}", err=True)
+
+
+def _band(band: tuple[float, float], limit_from: Path | None) -> tuple[float, float]:
+    """As stated, or up to the direction limit of a study."""
+    if limit_from is None:
+        return band
+    from study.workflows.equalizer.direction_limit import band_of_study
+
+    found = band_of_study(limit_from, band[0])
+    typer.echo(f"Note: {found.told}", err=True)
+    return found.band_hz

@@ -77,7 +77,11 @@ def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOut
 def confirmation_of(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS) -> Form:
     """Confirmation form before a refused consent or an exclusion becomes final."""
     consent, answers = form.kind is FormKind.CONSENT, coded(form, reply)
-    texts = [f"“{field.label}”" for field in form.fields if answers[field.key] != ("yes" if consent else "no")]
+    texts = [
+        words.fill("quoted", {"text": field.label})
+        for field in form.fields
+        if answers[field.key] != ("yes" if consent else "no")
+    ]
     return Form(
         form.kind,
         words["confirm_title"],

@@ -125,7 +125,8 @@ def _phenotype(folder: Path, table: str, answers: AnswerTable) -> list[Path]:
     lines = [["participant_id", "session_id", *(column.question.key for _, column in columns_of)]]
     lines += [[f"sub-{_label(subject)}", f"ses-{_label(session)}", *(_cell(row[place]) for place, _ in columns_of)]
               for subject, session, row in answers.rows]  # fmt: skip
-    described = {column.question.key: _describe_answers(column) for _, column in columns_of}
+    described = {"session_id": {"Description": "Session in which this was answered"}}
+    described |= {column.question.key: _describe_answers(column) for _, column in columns_of}
     text = "".join("\t".join(line) + "\n" for line in lines)
     place = folder / "phenotype"
     return [_text(place / f"{table}.tsv", text), _json(place / f"{table}.json", described)]

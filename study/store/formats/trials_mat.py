@@ -16,8 +16,6 @@ from study.store.formats.answer_table import AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 NAME = "trials.mat"
-LONGEST_FIELD = 31
-"""Characters of a field's name in this version of the format."""
 
 
 def write_trials_mat(
@@ -44,6 +42,7 @@ def write_trials_mat(
             "provenance": json.dumps(dict(facts), ensure_ascii=False),
         },
         oned_as="column",
+        long_field_names=True,  # 63 characters; the key of a question alone may have 40
     )
     write_atomically(folder / NAME, written.getvalue(), overwrite=False)
     return (folder / NAME,)
@@ -54,9 +53,11 @@ def _answers(table: AnswerTable) -> dict[str, Any]:
     if not table.columns:
         return {}
     rows = [(subject, session, *answers) for subject, session, answers in table.rows]
-    described = {column.name[:LONGEST_FIELD]: column.description for column in table.columns}
-    names = [name[:LONGEST_FIELD] for name in table.header]
-    return {"answers": dict(zip(names, map(_cells, zip(*rows, strict=True)), strict=False)), "questions": described}
+    described = {column.name: column.description for column in table.columns}
+    return {
+        "answers": dict(zip(table.header, map(_cells, zip(*rows, strict=True)), strict=False)),
+        "questions": described,
+    }
 
 
 def _column(values: Sequence[Any]) -> Any:

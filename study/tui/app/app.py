@@ -13,7 +13,7 @@ from textual.binding import Binding, BindingType
 from textual.events import Event
 from textual.screen import Screen
 
-from protocols.wording.words import ENGLISH_WORDS
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.errors import ExitCode
 from study.session.views.views import Reply as TrialReply
 from study.session.watching.requests import NoteAsked, PauseAsked
@@ -95,6 +95,11 @@ class HapteqApp(App[None]):
         if self._sitting is not None:
             self.outcome = self._engine.last_end
 
+    @property
+    def _words(self) -> Words:
+        """Of the participant who sits here."""
+        return ENGLISH_WORDS if self._sitting is None else self._sitting.words
+
     async def _sit(self, first: Begin | Resume) -> None:
         self._direct = self._direct and first is self._start.first
         self.outcome = self._letting_go = None
@@ -107,13 +112,13 @@ class HapteqApp(App[None]):
         message = event.message
         match message:
             case Finished():
-                self._end_sitting(outcomes.completion_outcome(message), message)
+                self._end_sitting(outcomes.completion_outcome(message, self._words), message)
             case Failed() if self._sitting is None:
                 self._archive.end_diagnosing()
                 self._archive.end_calibrating()
                 self._panel(outcomes.failure_outcome(message, at_home=True), message.path)
             case Failed():
-                self._end_sitting(outcomes.failure_outcome(message, at_home=False), message)
+                self._end_sitting(outcomes.failure_outcome(message, False, self._words), message)
             case _ if self._sitting is not None:
                 await self._sitting.hear(message)
             case _:
@@ -157,12 +162,12 @@ class HapteqApp(App[None]):
             self._leave(ExitCode.INTERRUPTED)
             return
         self._engine.send(LetGo())
-        panel = self._letting_go = self._panel(outcomes.LETTING_GO, "")
+        panel = self._letting_go = self._panel(outcomes.letting_go(self._words), "")
         self.set_timer(outcomes.UNHEARD_AFTER_S, lambda: self._unheard(panel))
 
     def _unheard(self, panel: OutcomeScreen) -> None:
         if self._letting_go is panel:
-            panel.tell(outcomes.UNHEARD)
+            panel.tell(outcomes.unheard(self._words))
             self.bell()
 
     async def action_quit(self) -> None:
@@ -175,8 +180,7 @@ class HapteqApp(App[None]):
         from study.tui.screens.help import HelpScreen
 
         about: str = getattr(self.screen, "HELP", "")
-        words = ENGLISH_WORDS if self._sitting is None else self._sitting.words
-        self.push_screen(HelpScreen(about.rstrip() + words["help_everywhere"], words))
+        self.push_screen(HelpScreen(about.rstrip() + self._words["help_everywhere"], self._words))
 
     def action_next_theme(self) -> None:
         self.theme = NEXT[self.theme]
@@ -199,7 +203,7 @@ class HapteqApp(App[None]):
     def _write(self, note: NoteAsked | None) -> None:
         if note is not None:
             self._engine.send(Relay(note))
-            self.notify("Noted: it is written at the next pause or trial.", markup=False)
+            self.notify(self._words["goes_into_log"], markup=False)
 
     def on_pause_screen_note_written(self, event: Any) -> None:
         self._engine.send(Relay(event.note))

@@ -1,41 +1,34 @@
 """Texts of the panel that is shown when something ended."""
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.engine.from_engine import Failed, Finished
 from study.tui.screens.outcome import Decision, Outcome
 
 UNHEARD_AFTER_S = 2.0
 
-LETTING_GO = Outcome(
-    "Letting go",
-    (("", "The device program was told to take the force away and to end the sitting. It answers in a moment."),),
-    ("quit",),
-)
-UNHEARD = Outcome(
-    "The stop was not answered",
-    (
-        ("What happened", f"The device program has not answered for {UNHEARD_AFTER_S:g} s."),
-        ("What is safe", "Every answer that was given is on disk."),
-        (
-            "What to do now",
-            "Take the hand off the handle and switch the device off. Then leave hapteq: that ends the device program. "
-            "The session can be resumed.",
-        ),
-    ),
-    ("quit",),
-)
+
+def letting_go(words: Words) -> Outcome:
+    return Outcome(words["stop_title"], (("", words["stop_told"]),), ("quit",), words=words)
 
 
-def failure_outcome(failure: Failed, at_home: bool) -> Outcome:
-    """Panel for a failure. at_home: nothing was running, and the screen below continues."""
+def unheard(words: Words) -> Outcome:
+    told = words.fill("stop_unheard", {"seconds": f"{UNHEARD_AFTER_S:g}"})
+    texts = (told, words["stop_safe"], words["stop_do_now"])
+    return Outcome(words["stop_unheard_title"], tuple(("", text) for text in texts), ("quit",), words=words)
+
+
+def failure_outcome(failure: Failed, at_home: bool, words: Words = ENGLISH_WORDS) -> Outcome:
+    """Panel for a failure. at_home: nothing was running, and the screen below continues. words: of the participant,
+    who may still sit there."""
     error = failure.error
     parts = (("What happened", error.happened), ("What is safe", error.saved), ("What to do now", error.do_now))
     way_on: tuple[Decision, ...] = ("back",) if at_home else ("home", "quit")
     paragraphs = tuple((heading, text) for heading, text in parts if text)
-    return Outcome(error.title, paragraphs, ("resume", *way_on) if failure.path else way_on)
+    return Outcome(error.title, (*_for_whom(words), *paragraphs), ("resume", *way_on) if failure.path else way_on)
 
 
-def completion_outcome(end: Finished) -> Outcome:
-    """Panel for a finished session."""
+def completion_outcome(end: Finished, words: Words = ENGLISH_WORDS) -> Outcome:
+    """Panel for a finished session. words: of the participant."""
     results = end.results
     parts = (
         ("Thresholds", "\n".join(results.table)),
@@ -44,4 +37,9 @@ def completion_outcome(end: Finished) -> Outcome:
     )
     paragraphs = tuple((heading, text) for heading, text in parts if text)
     title = f"The session is finished: {end.answers} answers"
-    return Outcome(title, paragraphs, ("look", "home", "quit"), grave=False)
+    return Outcome(title, (*_for_whom(words), *paragraphs), ("look", "home", "quit"), grave=False)
+
+
+def _for_whom(words: Words) -> tuple[tuple[str, str], ...]:
+    """English is the experimenter's: stated in the participant's language, where that is another."""
+    return () if words == ENGLISH_WORDS else (("", words["for_experimenter"]),)

@@ -132,8 +132,8 @@ class SittingScreens:
         """Called by the trial's screen, which disarms itself."""
         self._reply(reply)
 
-    async def prepare(self, sentence: str = ENGLISH_WORDS["preparing_device"]) -> None:
-        """Show that the device is prepared, while nothing is asked."""
+    async def prepare(self, sentence: str = "") -> None:
+        """Show that the device is prepared, while nothing is asked; nothing in words before the language is known."""
         self._number, self._shown, self._trial = 0, None, None
         if self._preparing is None:
             self._preparing = PreparingScreen(sentence)

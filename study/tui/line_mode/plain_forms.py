@@ -51,7 +51,9 @@ def device_checked(report: DeviceReport, talk: Conversation) -> bool:
     talk.forget()
     words = talk.words
     moves = f" {words['simulation']}" if report.simulated else ""
-    talk.say("", f"{words.fill('line_check', {'device': report.device})}{moves}")
+    talk.say("", f"{words.fill('line_check', {'device': words.fact(report.device)})}{moves}")
+    if report.findings:
+        talk.speak("for_experimenter")
     for finding in report.findings:
         advice = f". {finding.advice}" if finding.advice and not finding.fine else ""
         talk.say(f"{finding.verdict}: {finding.name}, {finding.value}{advice}")

@@ -47,7 +47,7 @@ def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
         keys_sentence(keys, words),
     )
     if not notice.felt:
-        talk.say("", words.fill("not_felt", {"device": notice.device}))
+        talk.say("", words.fill("not_felt", {"device": words.fact(notice.device)}))
     talk.say("", words["enter_begins"])
     talk.answer_or_leave()
 

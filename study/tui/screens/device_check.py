@@ -37,10 +37,10 @@ class DeviceCheckScreen(SpokenScreen[bool]):
         report, words = self._report, self.words
         names = max((len(finding.name) for finding in report.findings), default=0)
         with Sheet():
-            yield LiteralText(words.fill("check_title", {"device": report.device}), classes="title")
+            yield LiteralText(words.fill("check_title", {"device": words.fact(report.device)}), classes="title")
             if report.simulated:
                 yield LiteralText(words["simulation"])
-            yield LiteralText()
+            yield LiteralText(words["for_experimenter"] if report.findings else "")
             for finding in report.findings:
                 yield LiteralText(_line(finding, names), classes="fine" if finding.fine else "look")
                 if finding.advice and not finding.fine:

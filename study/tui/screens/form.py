@@ -196,17 +196,18 @@ class FormScreen(SpokenScreen[FormReply]):
 def _said(entry: FormEntry, all_answered: bool, words: Words) -> str:
     if entry.open:
         left, field = len(entry.open) - 1, entry.form.fields[entry.open[0]]
-        asked = _quote(field.label) if field.limits is None else limits_words(field.limits, words)
+        asked = _quote(field.label, words) if field.limits is None else limits_words(field.limits, words)
         please = words.fill("form_please", {"number": entry.open[0] + 1, "question": asked})
         return f"{please} {words.counted('form_more', left)}" if left else please
     if entry.check:
         changes = ", ".join(
-            words.fill("form_change", {"number": index + 1, "answer": entry.given[index].answer})
+            words.fill("form_change", {"number": index + 1, "answer": _quote(entry.given[index].answer, words)})
             for index in entry.check
         )
         return words.fill("form_changed", {"changes": changes})
     return words["form_done"] if all_answered else ""
 
 
-def _quote(label: str) -> str:
-    return f"“{label}”" if len(label) <= LONGEST_QUOTE else f"“{label[: LONGEST_QUOTE - 1].rstrip()}…”"
+def _quote(label: str, words: Words) -> str:
+    short = label if len(label) <= LONGEST_QUOTE else f"{label[: LONGEST_QUOTE - 1].rstrip()}…"
+    return words.fill("quoted", {"text": short})

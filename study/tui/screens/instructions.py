@@ -46,7 +46,7 @@ class InstructionsScreen(SpokenScreen[None]):
             yield LiteralText(plan(welcome, words))
             yield LiteralText(words["stop_any_time"])
             if not welcome.felt:
-                yield LiteralText(words.fill("not_felt", {"device": welcome.device}), classes="practice")
+                yield LiteralText(words.fill("not_felt", {"device": words.fact(welcome.device)}), classes="practice")
             yield LiteralText(words["enter_begins"], classes="gap strong")
         yield Footer(show_command_palette=False)
 

@@ -12,7 +12,9 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Static
 
+from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.dismiss_screen import dismiss_screen
+from study.tui.spoken_screen import SpokenScreen
 
 Decision = Literal["resume", "look", "home", "quit", "back"]
 
@@ -43,9 +45,11 @@ class Outcome:
     """Possible next steps, in this order."""
     grave: bool = True
     """False for good news."""
+    words: Words = ENGLISH_WORDS
+    """In which a participant is told what to do."""
 
 
-class OutcomeScreen(ModalScreen[Decision]):
+class OutcomeScreen(SpokenScreen[Decision], ModalScreen[Decision]):
     HELP = HELP
     CSS = """
     OutcomeScreen { align: center middle; }
@@ -66,7 +70,7 @@ class OutcomeScreen(ModalScreen[Decision]):
     ]
 
     def __init__(self, outcome: Outcome) -> None:
-        super().__init__()
+        super().__init__(outcome.words)
         self._outcome = outcome
 
     def compose(self) -> ComposeResult:
@@ -81,13 +85,13 @@ class OutcomeScreen(ModalScreen[Decision]):
 
     def tell(self, outcome: Outcome) -> None:
         """Replace the content when more is known."""
-        self._outcome = outcome
+        self._outcome, self.words = outcome, outcome.words
         if not self.query("#told"):
             return
         self.set_class(not outcome.grave, "-good")
         self.query_one(Vertical).border_title = f"{'! ' if outcome.grave else ''}{outcome.title}"
         self.query_one("#told", Static).update(_told(outcome))
-        keys = [KEYS[decision] for decision in outcome.decisions]
+        keys = [(key, self.words.key(words)) for key, words in map(KEYS.__getitem__, outcome.decisions)]
         self.query_one("#offered", Static).update("\n".join(f"{key.capitalize():5}  {words}" for key, words in keys))
         self.refresh_bindings()
 

@@ -11,9 +11,12 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.spoken_screen import SpokenScreen
 
 TICK_S = 0.5
+SILENT = "…"
 
 
 class PreparingScreen(SpokenScreen[None]):
+    """Without a sentence it says nothing: until the protocol was read, the participant's language is not known."""
+
     PAGE = "help_preparing"
     CSS = """
     PreparingScreen { align: center middle; }
@@ -33,10 +36,12 @@ class PreparingScreen(SpokenScreen[None]):
 
     def compose(self) -> ComposeResult:
         with Vertical() as box:
-            box.border_title = self.words["preparing_title"]
-            yield Static(self._sentence, id="sentence", markup=False)
-            yield Static(elapsed_words(0.0, self.words), id="elapsed", markup=False)
-        yield Footer(show_command_palette=False)
+            box.border_title = self._sentence and self.words["preparing_title"]
+            yield Static(self._sentence or SILENT, id="sentence", markup=False)
+            yield Static(self._waited(), id="elapsed", markup=False)
+        footer = Footer(show_command_palette=False)
+        footer.display = bool(self._sentence)
+        yield footer
 
     def on_mount(self) -> None:
         self.set_interval(TICK_S, self._tick)
@@ -48,15 +53,24 @@ class PreparingScreen(SpokenScreen[None]):
             self._began_s = self._now_s()
         if self.query("#sentence"):
             self.query_one("#sentence", Static).update(sentence)
+            self.query_one(Footer).display = True
+            self._title_box()
 
     def speak(self, words: Words) -> None:
         """Show the texts in this language from now on."""
         self.words = words
+        self._title_box()
+        self.refresh_bindings()
+
+    def _title_box(self) -> None:
         for box in self.query(Vertical):
-            box.border_title = words["preparing_title"]
+            box.border_title = self._sentence and self.words["preparing_title"]
 
     def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(elapsed_words(self._now_s() - self._began_s, self.words))
+        self.query_one("#elapsed", Static).update(self._waited())
+
+    def _waited(self) -> str:
+        return elapsed_words(self._now_s() - self._began_s, self.words) if self._sentence else ""
 
 
 def elapsed_words(seconds: float, words: Words = ENGLISH_WORDS) -> str:

@@ -1,5 +1,6 @@
 """One of the two answers: its number, its direction as a large segment, and in words."""
 
+import textwrap
 from typing import Literal
 
 from rich.segment import Segment
@@ -57,10 +58,12 @@ class DirectionPanel(Widget):
         coloured = plain + self.get_component_rich_style(
             "direction-panel--one" if self.number == 1 else "direction-panel--two", partial=True
         )
-        if y == height - 1:
-            return Strip([Segment(self._words().center(width)[:width], plain + Style(bold=True))], width)
+        words = self._lines()
+        above = height - len(words)
+        if y >= above:
+            return Strip([Segment(words[y - above].center(width)[:width], plain + Style(bold=True))], width)
         drawing, beside = self._make_drawing()
-        row = y - (height - 1 - len(drawing)) // 2
+        row = y - (above - len(drawing)) // 2
         drawn = drawing[row] if 0 <= row < len(drawing) else ""
         number = NUMBERS[self.number][y] if y < 3 and self.picture is not None else ""
         text = f" {number}".ljust(beside) + drawn
@@ -68,12 +71,16 @@ class DirectionPanel(Widget):
 
     def _make_drawing(self) -> tuple[tuple[str, ...], int]:
         """The rows, and the number of free columns to their left."""
-        room = _room(self.size)
+        room = _room(Size(self.size.width, self.size.height - len(self._lines())))
         if self.picture is None:
             drawing = large_number(self.number, room.width, room.height)
         else:
             drawing = draw_large_direction(self.picture, self.number, room.width, room.height)
         return drawing, (self.size.width - room.width) // 2
+
+    def _lines(self) -> list[str]:
+        """The words in as many lines as they need, for a cut word may be the one that tells the directions apart."""
+        return textwrap.wrap(self._words(), max(1, self.size.width), break_on_hyphens=False) or [""]
 
     def _words(self) -> str:
         if self.picture is None:
@@ -82,6 +89,6 @@ class DirectionPanel(Widget):
 
 
 def _room(size: Size) -> Size:
-    """A visually square area: cells are twice as high as wide."""
-    rows = max(1, min(size.height - 1, (size.width - 2 * BESIDE) // 2))
+    """A visually square area within it: cells are twice as high as wide."""
+    rows = max(1, min(size.height, (size.width - 2 * BESIDE) // 2))
     return Size(2 * rows, rows)

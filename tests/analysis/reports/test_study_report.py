@@ -9,8 +9,11 @@ import pytest
 from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
+from analysis.psychophysics.thresholds import RunEnd
 from analysis.reports.side_tables import detection_table, practice_table
 from analysis.reports.study_report import render_study_report
+from protocols.definition.declared_analysis import AnalysisSettings
+from protocols.definition.staircase_rule import BayesianPlacement
 from protocols.trial import Phase
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
@@ -228,3 +231,20 @@ def test_text_from_outside_is_escaped(report, simulate_study):
 def test_the_same_study_gives_the_same_page(report, simulate_study):
     trials = [trial for trial in simulate_study(subjects=1) if trial.run < 3]
     assert report(trials) == report(trials)
+
+
+def test_where_psi_chose_the_levels_nothing_speaks_of_reversals(simulate_study, protocol):
+    rule = replace(protocol.staircase, bayesian=BayesianPlacement(15))
+    study = replace(protocol, staircase=rule, analysis=AnalysisSettings(primary="published", contrast_hz=(45.0, 5.0)))
+    analysis = analyse_study(simulate_study(subjects=2, rule=rule), study)
+    pictures = study_pictures(analysis, ())
+    drawn = " ".join(
+        text.get_text()
+        for picture in pictures
+        for text in picture.figure.findobj(lambda artist: hasattr(artist, "get_text"))
+    )
+    said = render_study_report(analysis, pictures, {}, "2026-01-02T03:04:05Z")
+    said = f"{re.sub('<[^>]*>', ' ', re.sub(r'src=.data[^>]*|<svg.*?</svg>', '', said, flags=re.DOTALL))} {drawn}"
+    assert re.findall(r".{30}(?:[Rr]eversal|[Ss]taircase|peaks|valley).{30}", said) == []
+    assert "Differences by Psi's posterior means" in said.replace("&#x27;", "'").replace("&#39;", "'")
+    assert {row.ended for row in analysis.thresholds} == {RunEnd.PSI}

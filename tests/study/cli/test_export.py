@@ -8,11 +8,14 @@ from pathlib import Path
 import pytest
 from scipy.io import loadmat
 
+from protocols.definition.participant_text import Question
 from protocols.trial import Trial
 from study.cli.main import main
 from study.store.disk.csv_rows import columns
+from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 from study.store.formats.trials_file import read_trials
+from study.store.formats.trials_mat import write_trials_mat
 
 PSYCH_DS_FILE = re.compile(r"[a-z]+-[A-Za-z0-9]+(_[a-z]+-[A-Za-z0-9]+)*_data\.csv")
 
@@ -98,6 +101,14 @@ def test_a_matlab_file_holds_every_trial(data, tmp_path):
     assert list(found["trials"]["session"]) == [trial.session for trial in trials]
     assert set(found["trials"]) == set(columns(Trial))
     assert found["units"]["level_n"] == "N"
+
+
+def test_answers_to_questions_of_long_keys_stay_apart(tmp_path):
+    keys = ("hours_of_sleep_in_the_night_before", "hours_of_sleep_in_a_usual_night_of_theirs")
+    questions = tuple(AnswerColumn("before", Question(key[:40], "How long?", number=(0.0, 24.0))) for key in keys)
+    write_trials_mat(tmp_path, "s", (), "", {}, AnswerTable(questions, (("P01", "P01_001", ("5", "8")),)))
+    found = loadmat(tmp_path / "trials.mat", simplify_cells=True)["answers"]
+    assert [found[f"before_{key[:40]}"] for key in keys] == ["5", "8"]
 
 
 def test_bids_has_a_table_per_session_and_says_what_is_missing(data, tmp_path):

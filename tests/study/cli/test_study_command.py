@@ -1,8 +1,11 @@
 """A study from the command line: who sits down, what is refused, and how it is left."""
 
 import json
+import os
 
 import pytest
+
+from study.tui.line_mode.line_input import LineInput
 
 pytestmark = pytest.mark.usefixtures("validated_here", "sketched")
 
@@ -43,6 +46,20 @@ def test_an_interruption_is_exit_code_130(run, small_file, tmp_path, monkeypatch
     assert "Go on with: hapteq resume" in err
     monkeypatch.undo()
     assert run("resume", "ideal1_001", "--data", tmp_path / "d")[0] == 0
+
+
+def test_a_person_waits_for_the_device_in_the_language_of_the_protocol(run, small_text, tmp_path, monkeypatch):
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    german = tmp_path / "german.toml"
+    german.write_text(f'{small_text}\n[text]\nlanguage = "de"\n', encoding="utf-8")
+    read, _ = os.pipe()
+    monkeypatch.setattr("study.cli.conduct.LineInput", lambda: LineInput(read))
+    monkeypatch.setattr("study.cli.conduct.conduct_new", interrupted)
+    _, _, err = run("study", "--protocol", german, "--plain", "--subject", "P01", "--data", tmp_path / "d")
+    assert "Das Gerät wird vorbereitet: beim ersten Mal etwa zehn Sekunden." in err
+    assert "Preparing" not in err
 
 
 def test_a_finished_session_is_said_to_be_finished(run, data):

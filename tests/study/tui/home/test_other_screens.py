@@ -1,10 +1,12 @@
 """The diagnosis, opening a file, the wait for the device."""
 
+import re
 from dataclasses import replace
 
 import pytest
 from textual.widgets import Input
 
+from protocols.wording.words import Words
 from study.tui.screens.browse import BrowseScreen
 from study.tui.screens.diagnosis import DiagnosisScreen
 from study.tui.screens.home import HomeScreen
@@ -133,6 +135,23 @@ def test_while_the_device_is_prepared_it_says_what_and_for_how_long(on_screen, m
         assert "1 min 15 s so far" in sight.text
 
     on_screen(PreparingScreen("Compiling the simulation.", lambda: now[0]), story)
+
+
+def test_before_the_language_is_known_nothing_is_said(on_screen):
+    german = Words({"preparing_title": "Einen Moment", "key_help": "Hilfe", "elapsed_s": "bisher {seconds} s"})
+
+    async def story(sight):
+        assert re.findall(r"[A-Za-z]{2,}", sight.text) == []
+        sight.app.screen.speak(german)
+        await sight.pilot.pause()
+        assert re.findall(r"[A-Za-z]{2,}", sight.text) == []
+        sight.app.screen.say("Das Gerät wird vorbereitet.")
+        await sight.until(lambda: "bisher 0 s" in sight.text)
+        assert "Einen Moment" in sight.text
+        assert "Hilfe" in sight.text
+        assert "Help" not in sight.text
+
+    on_screen(PreparingScreen(""), story)
 
 
 def test_elapsed_time_counts_whole_seconds():

@@ -10,12 +10,13 @@ from protocols.trial import Phase
 from protocols.wording.english import ENGLISH
 from protocols.wording.words import Words
 from study.devices.clock import VirtualClock
-from study.session.views.form_views import FormKind
-from study.session.views.forms import form_of
+from study.session.views.form_views import FormKind, FormReply
+from study.session.views.forms import confirmation_of, form_of
 from study.session.views.views import (
     AfterPause,
     DemoDone,
     DemoMenu,
+    DeviceFinding,
     DeviceReport,
     DirectionPicture,
     Goodbye,
@@ -92,7 +93,7 @@ def told(spoken):
 def test_the_trial_part_is_in_the_language(told):
     display = told.display
     told.type("")
-    display.welcome(Welcome("Titel", PICTURE, 5, 1, "omega.3", False, 12))
+    display.welcome(Welcome("Titel", PICTURE, 5, 1, "simulated omega.3", False, 12))
     told.type("x", "2", "?", "n", "n", "n", "b", "b", "b", "")
     menu = DemoMenu(PICTURE, 2, 1, ((1, 1),), handle_moves=False)
     display.choose_demo(menu, lambda: True)
@@ -109,6 +110,7 @@ def test_the_trial_part_is_in_the_language(told):
     display.ask(replace(QUESTION, repeats_left=2), lambda: True)
     display.feedback(True)
     display.feedback(False)
+    assert "simulated" not in told.out.getvalue()
     told.check("line_hold", "line_how", "line_keys", "not_felt", "welcome_back_n", "plan_training_runs_n",
                "line_intervals", "fact_direction", "fact_bring_back", "no_repeats", "right", "wrong")  # fmt: skip
 
@@ -129,10 +131,11 @@ def test_the_rest_of_it_too(told):
     display.goodbye(Goodbye(False, 0, outcome="excluded"))
     display.trouble("Hands off: the reference plays for 20 s.")
     told.type("x", "c", "")
-    display.device_checked(DeviceReport("omega.3", True, ()))
-    told.check("practice_hard", "runs_left_1", "line_pause_keys", "withdraw_all", "nothing_erased", "line_noted",
-               "saved_1", "void_title", "line_finished_1", "excluded", "excluded_kept", "fact_hands_off",
-               "check_ready")  # fmt: skip
+    display.device_checked(DeviceReport("simulated omega.3", True, (DeviceFinding("Handle", "0.1 mm", True),)))
+    assert "simulated" not in told.out.getvalue()
+    told.check("for_experimenter", "practice_hard", "runs_left_1", "line_pause_keys", "withdraw_all", "nothing_erased",
+               "line_noted", "saved_1", "void_title", "line_finished_1", "excluded", "excluded_kept",
+               "fact_hands_off", "check_ready")  # fmt: skip
 
 
 def test_forms_are_answered_in_the_language_by_word_letter_or_number(told, spoken):
@@ -142,6 +145,10 @@ def test_forms_are_answered_in_the_language_by_word_letter_or_number(told, spoke
     told.type("xyz", no, "b", yes, yes[0], "1", yes, table["line_form_confirm_letter"])
     reply = display.fill_in(consent)
     assert set(reply.answers.values()) == {yes}
+    left, right = table["quoted"].split("{text}")
+    check = confirmation_of(consent, FormReply({**reply.answers, "statement_1": no}), Words(table))
+    assert f"{left}{table['protocol_told']}{right}" in check.introduction
+    assert left != ENGLISH["quoted"][0]
     questions = form_of(spoken, FormKind.QUESTIONNAIRE)
     told.type("abc", "7", "34,5", "")
     assert display.fill_in(questions).answers == {"age": "34,5", "handedness": ""}

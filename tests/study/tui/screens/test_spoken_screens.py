@@ -19,7 +19,9 @@ from study.session.views.form_views import FormKind
 from study.session.views.forms import form_of
 from study.session.views.views import (
     DemoMenu,
+    DeviceFinding,
     DeviceReport,
+    DirectionPicture,
     Goodbye,
     HandleView,
     PauseNotice,
@@ -30,6 +32,8 @@ from study.session.views.views import (
     Welcome,
 )
 from study.store.formats.protocol_files import read_protocol
+from study.tui.app import outcomes
+from study.tui.drawing.direction_picture import sentence
 from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.demo import DemoScreen
@@ -40,6 +44,7 @@ from study.tui.screens.handle import HandleScreen
 from study.tui.screens.help import HelpScreen
 from study.tui.screens.instructions import InstructionsScreen
 from study.tui.screens.note import NoteScreen
+from study.tui.screens.outcome import OutcomeScreen
 from study.tui.screens.pause import PauseScreen
 from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.practice_over import PracticeOverScreen
@@ -103,7 +108,9 @@ SCREENS = {
     "note": lambda words: NoteScreen(adverse=True, words=words),
     "withdrawal": lambda words: ConfirmWithdrawal(words),
     "preparing": lambda words: PreparingScreen(words["preparing_device"], words=words),
-    "device": lambda words: DeviceCheckScreen(DeviceReport("omega.3", True, ()), words),
+    "device": lambda words: DeviceCheckScreen(
+        DeviceReport("simulated omega.3", True, (DeviceFinding("Handle", "0.1 mm", True),)), words
+    ),
     "instructions": lambda words: InstructionsScreen(Welcome("Titel", PICTURE, 5, 1, "omega.3", True, 0), words=words),
 }
 
@@ -138,6 +145,37 @@ def test_a_screen_says_all_of_it_and_nothing_in_english(on_stage, name, code):
         assert cut == [], stage.text
 
     on_stage(screen, story)
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+@pytest.mark.parametrize("plane", ["yz", "zx", "xy"])
+def test_directions_are_told_to_the_last_word(on_stage, plane, code):
+    words = Words(table_of(code))
+    picture = DirectionPicture(plane, (135.0, 45.0))
+
+    async def story(stage):
+        lines = [line.ljust(80) for line in stage.text.splitlines()]
+        for number, half in ((1, slice(0, 40)), (2, slice(40, 80))):
+            inside = " ".join(re.sub(r"[│┃⠀-⣿]", " ", line[half]) for line in lines)
+            assert sentence(picture, number, words) in " ".join(inside.split())
+
+    on_stage(armed(words, replace(QUESTION, picture=picture)), story)
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_what_a_stop_tells_is_in_the_language(on_stage, code):
+    words = Words(table_of(code))
+
+    async def story(stage):
+        assert english_in(stage.words, words.own) == []
+        assert words["key_quit"] in stage.words
+        assert words["key_leave"] in stage.text.splitlines()[-1]
+        stage.app.screen.tell(outcomes.unheard(words))
+        await stage.pilot.pause()
+        assert english_in(stage.words, words.own) == []
+        assert words["stop_do_now"].split(":")[0] in re.sub(r"[\s│┃]+", " ", stage.words)
+
+    on_stage(OutcomeScreen(outcomes.letting_go(words)), story)
 
 
 @pytest.mark.parametrize("code", LANGUAGES)

@@ -45,3 +45,18 @@ def test_off_it_leaves_the_hash_alone_and_it_does_not_go_with_roving(placed):
     assert protocol_hash(replace(placed.protocol, staircase=off)) != protocol_hash(placed.protocol)
     with pytest.raises(ValueError, match="rove_db"):
         replace(placed.protocol, stimulus=replace(placed.protocol.stimulus, rove_db=3.0))
+
+
+def test_what_of_the_staircase_does_not_go_with_it_is_refused(placed):
+    rule = placed.protocol.staircase
+    with pytest.raises(ValueError, match="initial_one_up_one_down"):
+        replace(rule, initial_one_up_one_down=True)
+    with pytest.raises(ValueError, match=r"staircase\.trial_limit"):
+        replace(placed.protocol, staircase=replace(rule, trial_limit=TRIALS - 1))
+    replace(placed.protocol, staircase=replace(rule, trial_limit=TRIALS))
+
+
+def test_a_detection_that_could_never_end_with_a_threshold_is_refused(placed):
+    short = replace(placed.protocol.detection, frequencies_hz=(35.0,), trial_limit=TRIALS - 1)
+    with pytest.raises(ValueError, match="detection.trial_limit"):
+        replace(placed.protocol, detection=short)
