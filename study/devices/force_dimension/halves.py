@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.newest_sample import CLIPPED, COUNT, FRESH_S, REST, ROWS, SENSED, TAKEN_S
 from study.devices.drive.compiled_drive import SENSE_SIGNATURE, WRITE_SIGNATURE
 from study.devices.force_dimension.handle import SCALED, STALE
-from study.devices.force_dimension.looks import (
+from study.devices.force_dimension.loop_cells import (
     BRAKES,
     CAP_N,
     CLOSED,

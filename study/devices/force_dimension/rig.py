@@ -14,7 +14,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
-from study.devices.force_dimension import halves, looks
+from study.devices.force_dimension import halves, loop_cells
 from study.devices.force_dimension.halves import LOCK_S
 from study.devices.force_dimension.handle import Handle, why_off
 from study.devices.force_dimension.library import LibraryError
@@ -60,12 +60,12 @@ class ForceDimensionRig:
         self._handle = handle
         self._accelerometer = accelerometer
         self._sending = SharedLock()
-        self._calls = np.concatenate([system_calls(self._sending), handle.library.addresses(looks.LIBRARY)])
-        self._cells: FloatArray = np.zeros(looks.CELLS_SIZE)
-        self._cells[looks.NUMBER] = handle.number
-        self._cells[looks.CAP_N] = min(cap_n, info.max_force_n)
-        self._cells[looks.DROPS_AFTER_S] = drops_force_after_s
-        self._cells[looks.SENT_S], self._cells[looks.SENT_ZERO] = time.monotonic(), 1.0
+        self._calls = np.concatenate([system_calls(self._sending), handle.library.addresses(loop_cells.LIBRARY)])
+        self._cells: FloatArray = np.zeros(loop_cells.CELLS_SIZE)
+        self._cells[loop_cells.NUMBER] = handle.number
+        self._cells[loop_cells.CAP_N] = min(cap_n, info.max_force_n)
+        self._cells[loop_cells.DROPS_AFTER_S] = drops_force_after_s
+        self._cells[loop_cells.SENT_S], self._cells[loop_cells.SENT_ZERO] = time.monotonic(), 1.0
         shared: FloatArray | None = getattr(accelerometer, "samples", None)
         self._samples: FloatArray = np.zeros((1, 1)) if shared is None else shared
         self._overlaid = accelerometer if shared is None else None
@@ -90,7 +90,7 @@ class ForceDimensionRig:
         return reading
 
     def buttons(self) -> frozenset[int]:
-        mask = int(self._cells[looks.PRESSED])
+        mask = int(self._cells[loop_cells.PRESSED])
         return frozenset(bit for bit in range(32) if mask >> bit & 1)
 
     def write(self, force_n: FloatArray) -> None:
@@ -103,8 +103,8 @@ class ForceDimensionRig:
         """Simulates a stopped loop: sends nothing for this long, not even zeros. Returns the time of the last force,
         s."""
         with self._sending:
-            self._cells[looks.WITHHELD_UNTIL_S] = time.monotonic() + seconds
-            return float(self._cells[looks.SENT_S])
+            self._cells[loop_cells.WITHHELD_UNTIL_S] = time.monotonic() + seconds
+            return float(self._cells[loop_cells.SENT_S])
 
     def force_on(self) -> bool:
         """Whether the device takes forces just now, as it says. From any thread. Raises `DeviceError`."""
@@ -136,25 +136,25 @@ class ForceDimensionRig:
                     self._handle.set_force(0.0, 0.0, 0.0)
 
     def close(self) -> bool:
-        self._cells[looks.WITHHELD_UNTIL_S] = 0.0
-        self._cells[looks.CLOSED] = 1.0
+        self._cells[loop_cells.WITHHELD_UNTIL_S] = 0.0
+        self._cells[loop_cells.CLOSED] = 1.0
         self._closed.set()
         got = self._sending.acquire(LOCK_S)
         try:
-            self._cells[looks.LET_GO] = self._handle.let_go()
+            self._cells[loop_cells.LET_GO] = self._handle.let_go()
         finally:
             if got:
                 self._sending.release()
             if self._accelerometer is not None:
                 self._accelerometer.close()
-        return bool(self._cells[looks.LET_GO])
+        return bool(self._cells[loop_cells.LET_GO])
 
     def _rest(self) -> None:
         """Repeat a zero force. Never sends one between two forces, nor anything after a failure."""
         every_s, zero, cells = REST_SHARE * self.drops_force_after_s, np.zeros(3), self._cells
-        while not self._closed.wait(every_s) and cells[looks.FAILED] == 0.0:
+        while not self._closed.wait(every_s) and cells[loop_cells.FAILED] == 0.0:
             with self._sending:
-                resting = cells[looks.SENT_ZERO] and time.monotonic() - cells[looks.SENT_S] >= every_s
+                resting = cells[loop_cells.SENT_ZERO] and time.monotonic() - cells[loop_cells.SENT_S] >= every_s
                 if resting and not self._closed.is_set():
                     code = halves.send_once(self._calls, cells, zero)
                     if code:
@@ -168,27 +168,27 @@ class ForceDimensionRig:
     def _error(self, code: int) -> DeviceError:
         """The error of a code; called in the thread that got the code, because the library keeps its last error per
         thread."""
-        return self._failure or self._fail(self._words(int(self._cells[looks.FAILED]) or code))
+        return self._failure or self._fail(self._words(int(self._cells[loop_cells.FAILED]) or code))
 
     def _words(self, code: int) -> str:
-        function = code - looks.OF_LIBRARY
-        if 0 <= function < len(looks.LIBRARY):
-            return f"The library says: {self._handle.library.last_error(looks.LIBRARY[function])}"
-        cap_n, refused_n = self._cells[looks.CAP_N], self._cells[looks.REFUSED_N]
+        function = code - loop_cells.OF_LIBRARY
+        if 0 <= function < len(loop_cells.LIBRARY):
+            return f"The library says: {self._handle.library.last_error(loop_cells.LIBRARY[function])}"
+        cap_n, refused_n = self._cells[loop_cells.CAP_N], self._cells[loop_cells.REFUSED_N]
         return {
-            looks.REPEATS: "It repeats its last position again and again",
-            looks.RELEASED: f"It let its force go: {why_off(int(self._cells[looks.OFF_CAUSE]))}",
-            looks.REFUSED: f"A force of {refused_n:g} N was refused; at most {cap_n:g} N may be sent",
-            looks.LOCKED: "An earlier force is still being sent",
-            looks.IS_CLOSED: "It is closed",
-            looks.WEAK: "Its motors cannot give the force that is asked for, and give less",
-            looks.GIVES_ANOTHER: "It says that it gives another force than it was sent, again and again",
+            loop_cells.REPEATS: "It repeats its last position again and again",
+            loop_cells.RELEASED: f"It let its force go: {why_off(int(self._cells[loop_cells.OFF_CAUSE]))}",
+            loop_cells.REFUSED: f"A force of {refused_n:g} N was refused; at most {cap_n:g} N may be sent",
+            loop_cells.LOCKED: "An earlier force is still being sent",
+            loop_cells.IS_CLOSED: "It is closed",
+            loop_cells.WEAK: "Its motors cannot give the force that is asked for, and give less",
+            loop_cells.GIVES_ANOTHER: "It says that it gives another force than it was sent, again and again",
         }[code]
 
     def _fail(self, happened: str) -> DeviceError:
         """The first failure stays: the next call says the same."""
         if self._failure is None:
-            self._cells[looks.FAILED] = self._cells[looks.FAILED] or looks.SAID
+            self._cells[loop_cells.FAILED] = self._cells[loop_cells.FAILED] or loop_cells.SAID
             self._failure = DeviceError(
                 f"The {self.info.name} let go",
                 f"{happened}.",

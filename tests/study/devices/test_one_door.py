@@ -29,7 +29,7 @@ NAMED_IN = {
     },
     "dhdSetForce": {
         "study/devices/force_dimension/handle.py",
-        "study/devices/force_dimension/looks.py",
+        "study/devices/force_dimension/loop_cells.py",
         "study/devices/force_dimension/library.py",
     },
     "CompiledRunner": {"study/devices/safe.py"},

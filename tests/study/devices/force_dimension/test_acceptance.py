@@ -9,7 +9,7 @@ import pytest
 
 from study.cli.main import main
 from study.devices.clock import RealClock
-from study.devices.force_dimension import force_proof, looks, watchdog_proof
+from study.devices.force_dimension import force_proof, loop_cells, watchdog_proof
 from study.devices.force_dimension.acceptance import VALID_FOR, acceptance_file
 from study.devices.governor import cells
 from study.devices.opening import accept_device, open_device
@@ -102,7 +102,7 @@ def test_a_device_that_lets_go_under_force_is_accepted_and_then_opens(locked, pa
 
 def cap_opened_at_each_tick(device, rig, stub) -> None:
     device._governor.settings[[cells.STIMULUS_CAP, cells.TOTAL_CAP]] = 3.0
-    rig._cells[looks.CAP_N] = 3.0
+    rig._cells[loop_cells.CAP_N] = 3.0
     stub.set("cap_works", 0)
 
 

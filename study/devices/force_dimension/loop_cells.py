@@ -1,4 +1,4 @@
-"""What the two halves of a tick share: their cells, their codes, and the look at the device that comes now and then."""
+"""What the two halves of a tick share: memory cells, error codes, and the occasional check of the status."""
 
 import math
 
@@ -18,13 +18,14 @@ from study.devices.governor.compiling import part
 from study.devices.native import SYSTEM_SIZE, Addresses, call_int, room_for_16, word
 
 ODD_FOR, ODD_SHARE = 5, 0.1
-"""The same of looks at which the device says that it gives another force than it was sent."""
+"""Status checks with another reported force than the one that was sent, and their share, beyond which the device
+is stopped."""
 
 ODD_N, ODD_PART = 0.2, 0.2
-"""So far, and so large a share of what was sent, may the two lie apart: what an acceptance allows."""
+"""Difference of the two forces that an acceptance allows: N, and a share of the one that was sent."""
 
 POSITION, FORCE, STATUS, BUTTONS, BRAKES, ENABLE, GIVEN, CALLS_SIZE = range(SYSTEM_SIZE, SYSTEM_SIZE + 8)
-"""Behind the places of `native`: addresses of the library's functions, `LIBRARY`."""
+"""Places of the addresses of the library's functions (`LIBRARY`), after those of `native`."""
 LIBRARY = (
     "dhdGetPosition", "dhdSetForce", "dhdGetStatus", "dhdGetButtonMask", "dhdSetBrakes", "dhdEnableForce", "dhdGetForce"
 )  # fmt: skip
@@ -33,26 +34,26 @@ LIBRARY = (
     NUMBER, CAP_N, DROPS_AFTER_S, READS, REPEATED, TOO_STRONG, PRESSED, SENT_S, SENT_ZERO, WITHHELD_UNTIL_S, CLOSED,
     LET_GO, FAILED, OFF_CAUSE, REFUSED_N, ODD, TELLS,
 ) = range(17)  # fmt: skip
-"""Cells of the driver. REPEATED, TOO_STRONG, ODD: readings, forces and looks beyond their share, as `beyond` counts;
-PRESSED: mask of buttons; OFF_CAUSE, REFUSED_N: for the words about a failure; TELLS: the device once said that it gives
+"""Cells of the driver. REPEATED, TOO_STRONG, ODD: readings, forces and status checks beyond their share, as `beyond`
+counts; PRESSED: mask of buttons; OFF_CAUSE, REFUSED_N: for the text of a failure; TELLS: 1 once the device has reported
 a force."""
 
 TOLD, SENT = 17, 20
-"""From here on: the force that the device says it gives, x, y, z; and x, y of the last `MEMORY` that it was sent."""
+"""First cells of the force that the device reports (x, y, z; N), and of the last `MEMORY` forces sent (x, y; N)."""
 MEMORY = 3
 CELLS_SIZE = SENT + 2 * MEMORY
 
 OF_LIBRARY = 1
-"""The code of the first function of LIBRARY: a call of it failed. The others follow."""
+"""Error code of a failed call of the first function of LIBRARY; the codes of the others follow."""
 (REPEATS, RELEASED, REFUSED, LOCKED, IS_CLOSED, WEAK, GIVES_ANOTHER, FAILED_BEFORE, SAID) = range(
     OF_LIBRARY + len(LIBRARY), OF_LIBRARY + len(LIBRARY) + 9
 )
-"""SAID: it failed elsewhere, and the words are there."""
+"""Further error codes. SAID: the driver failed outside the loop, and has stated why."""
 
 
 @part
 def failed(cells: FloatArray, code: int) -> int:
-    """The first failure stays."""
+    """Keep the first failure; return `code`."""
     if cells[FAILED] == 0.0:
         cells[FAILED] = code
     return code
@@ -65,7 +66,7 @@ def of_library(cells: FloatArray, function: int) -> int:
 
 @part
 def beyond(count: float, happened: bool, share: float) -> float:
-    """How often something happened beyond this share of all times. A hair below the sum of its steps."""
+    """Count an event beyond its allowed share of all times (CUSUM). 1e-12 keeps a sum of steps below a whole."""
     return max(0.0, count + (1.0 if happened else 0.0) - share + 1e-12)
 
 
@@ -77,7 +78,8 @@ def _number_at(status: int, place: int) -> int:
 
 @part
 def check_on(calls: Addresses, cells: FloatArray) -> int:
-    """Whether it takes forces, or is silent as its watchdog has it after a zero. Else OFF_CAUSE says why not."""
+    """0 where the device takes forces, -1 where its watchdog has switched them off after a zero; else an error code,
+    and OFF_CAUSE holds the cause."""
     status = room_for_16()
     if call_int(calls[STATUS], (status, np.int32(cells[NUMBER]))) < 0:
         return of_library(cells, STATUS)
@@ -105,8 +107,8 @@ def note_sent(cells: FloatArray, x: float, y: float) -> None:
 
 @part
 def _gives_another(cells: FloatArray) -> bool:
-    """Whether TOLD is far from each of the last forces that were sent: what it tells may be a tick or two old. Only the
-    horizontal part: the vertical one may hold up the device's own weight."""
+    """Whether the reported force is far from each of the last forces sent: the report may be a tick or two old. Only
+    the horizontal part: the vertical one may hold up the device's own weight."""
     for k in range(MEMORY):
         x, y = cells[SENT + 2 * k], cells[SENT + 2 * k + 1]
         apart = math.hypot(cells[TOLD] - x, cells[TOLD + 1] - y)
@@ -117,7 +119,8 @@ def _gives_another(cells: FloatArray) -> bool:
 
 @part
 def _check_given(calls: Addresses, cells: FloatArray) -> int:
-    """A device that never tells any force, or cannot, is not judged by it: its acceptance was refused."""
+    """Compare the reported force with those sent. A device that never reports a force is not judged by it: its
+    acceptance was refused."""
     place = cells.ctypes.data + 8 * TOLD
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
     if call_int(calls[GIVEN], asked) < 0:
