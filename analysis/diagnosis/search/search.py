@@ -28,7 +28,6 @@ from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.exchange import exchange_effects
 from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
@@ -219,8 +218,12 @@ def _explain_and_prune(
     newest = found.steps[-1].newest if found.steps else ""
 
     def finish() -> Explanation:
-        exchanged = exchange_effects(context, found, catalogue, progress, time_left)
-        return prune(context, exchanged, time_left)
+        if len(found.steps) < 2:
+            return prune(context, found, time_left)
+        # Imported here: only a diagnosis with several effects exchanges them.
+        from analysis.diagnosis.search.exchange import exchange_effects
+
+        return prune(context, exchange_effects(context, found, catalogue, progress, time_left), time_left)
 
     return context.guard.part(newest, "its last look", finish, nothing)
 
