@@ -42,10 +42,10 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import final_errors
+from analysis.diagnosis.search.revise_selection import without_effect
 from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
-from analysis.diagnosis.search.without_effect import without_effect
 from analysis.diagnosis.settings import CONFIRMED_LEAVES, FURTHER_LAW_OF_ALL, HELD_OUT_ERROR, INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray

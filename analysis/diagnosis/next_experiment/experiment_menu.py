@@ -57,27 +57,8 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
     def slow(of: float) -> FloatArray:
         return along(sine(slow_hz, of, int(length_s * sample_rate_hz), sample_rate_hz))
 
-    def elsewhere(of: float) -> FloatArray:
-        wave = log_sweep(slowest_hz, usual_hz, of, int(length_s * sample_rate_hz), sample_rate_hz)
-        return along(wave + of)
-
-    def released(of: float) -> FloatArray:
-        return np.outer(_releases(of, int(length_s * sample_rate_hz)), np.arange(model.inputs) == axis)
-
     sweep, wide = (f"a sweep from {slowest_hz:.3g} to {end:.3g} Hz" for end in (usual_hz, fastest_hz))
     levels = {1: "the highest level so far", 4: "a quarter of the highest level", 20: "a twentieth of it"}
-    held = (
-        Experiment(
-            f"{sweep} at {level / 2:.3g} on top of a constant push of as much, which moves it to another place",
-            elsewhere(level / 2),
-            "sweep",
-        ),
-        Experiment(
-            f"{RELEASES} releases: a push that grows slowly to {level:.3g}, to either side in turn, and ends at once",
-            released(level),
-            "step",
-        ),
-    )
     return (
         *(Experiment(f"{sweep} at {level / n:.3g}, {words}", swept(level / n), "sweep") for n, words in levels.items()),
         Experiment(f"{wide} at {level:.3g}", swept(level, fastest_hz), "sweep"),
@@ -93,7 +74,7 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
             "sweep",
             minutes=1.5,
         ),
-        *(held if _is_held(model, axis) else ()),
+        *(_pushes(sweep, level, swept(level / 2), fade) if _is_held(model, axis) else ()),
         Experiment(
             f"{sweep} at {level:.3g} with {_weight_words(model, added)}", swept(level), "sweep", added, minutes=3.0
         ),
@@ -104,6 +85,25 @@ def _is_held(model: MechanicalModel, axis: int) -> bool:
     """Whether a stiffness holds the axis: a constant force would drive another one away."""
     axes = driven_axes(model)[:, axis]
     return bool(axes @ model.stiffness @ axes > 0)
+
+
+def _pushes(sweep: str, level: float, half: FloatArray, fade: int) -> tuple[Experiment, Experiment]:
+    """Experiments with a constant push. sweep: in words; half: (n, m), at half the level; fade: samples."""
+    along = (np.abs(half).max(axis=0) > 0).astype(np.float64)
+    samples = len(half)
+    push = apply_fades(np.full(samples, level / 2), fade, fade)
+    return (
+        Experiment(
+            f"{sweep} at {level / 2:.3g} on top of a constant push of as much, which moves it to another place",
+            half + np.outer(push, along),
+            "sweep",
+        ),
+        Experiment(
+            f"{RELEASES} releases: a push that grows slowly to {level:.3g}, to either side in turn, and ends at once",
+            np.outer(_releases(level, samples), along),
+            "step",
+        ),
+    )
 
 
 def _releases(level: float, samples: int) -> FloatArray:

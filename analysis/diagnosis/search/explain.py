@@ -160,27 +160,20 @@ def explain(
     base = context.candidate(retuned)
     confirmed = context.with_test_score(base)
     surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > HELD_OUT_SURPRISE)
-    rounds: list[tuple[FittedCandidate, ...]] = []
-    steps: list[FittedCandidate] = []
+    steps = _known_steps(context, base, begun)
+    rounds: list[tuple[FittedCandidate, ...]] = [(step,) for step in steps]
+    base = steps[-1] if steps else base
     barred, ended_early = "", False
     within_time = replace(context, map_=limit_map(context.map_, time_left))
-    for certain in context.certain:
-        base = _add_certain(context, base, certain)
-        rounds.append((base,))
-        steps.append(base)
-    for step in begun:
-        base = _refit(context, step)
-        rounds.append((base,))
-        steps.append(base)
     more = SEARCH_ON * (1.0 if context.references is None else context.references.beyond)
     while (
         not context.certain
         and len(rounds) < MOST_EFFECTS
         and (base.score.worst_channel > (more if rounds else NOISE_ALONE) or (surprised and not rounds))
     ):
-        shown = Step(f"looking for the {_ORDINALS[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
+        step = Step(f"looking for the {_ORDINALS[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         try:
-            tried = find_next_effect(within_time, catalogue, base.fitted, shown)
+            tried = find_next_effect(within_time, catalogue, base.fitted, step)
         except OutOfTimeError:
             ended_early = True
             break
@@ -195,9 +188,17 @@ def explain(
     return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
 
 
-def _refit(context: SearchContext, step: FittedCandidate) -> FittedCandidate:
-    start = evaluate_fit(context.measure, context.tuning, step.fitted.deviations, step.fitted.hypothesis)
-    return context.candidate(refine(context, start))
+def _known_steps(
+    context: SearchContext, base: FittedCandidate, begun: Sequence[FittedCandidate]
+) -> list[FittedCandidate]:
+    """Fits of what is not searched for: the certain hypotheses, and the steps of a search on fewer samples."""
+    steps: list[FittedCandidate] = []
+    for hypothesis in context.certain:
+        steps.append(_add_certain(context, steps[-1] if steps else base, hypothesis))
+    for step in begun:
+        start = evaluate_fit(context.measure, context.tuning, step.fitted.deviations, step.fitted.hypothesis)
+        steps.append(context.candidate(refine(context, start)))
+    return steps
 
 
 def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:

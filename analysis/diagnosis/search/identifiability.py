@@ -18,9 +18,9 @@ from analysis.diagnosis.errors.intervals import STRETCH_S, standard_errors
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
+from analysis.diagnosis.search.revise_selection import without_effect
 from analysis.diagnosis.search.search_context import SearchContext, sensitivity_at
 from analysis.diagnosis.search.short_recordings import short_recordings_of
-from analysis.diagnosis.search.without_effect import without_effect
 from analysis.diagnosis.settings import INTERVAL_FACTOR, REPLACEMENTS_TRIED, UNDETERMINED_REACH
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray

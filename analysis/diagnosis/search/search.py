@@ -31,6 +31,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
+from analysis.diagnosis.search.revise_selection import exchange_effects, without_effect
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, shows_there_alone
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
@@ -41,7 +42,6 @@ from analysis.diagnosis.search.verdict import (
     shares_taken,
     worth_naming,
 )
-from analysis.diagnosis.search.without_effect import without_effect
 from analysis.diagnosis.settings import LAST_EFFECT_SHARE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
@@ -218,11 +218,6 @@ def _explain_and_prune(
     newest = found.steps[-1].newest if found.steps else ""
 
     def finish() -> Explanation:
-        if len(found.steps) < 2:
-            return prune(context, found, time_left)
-        # Imported here: only a diagnosis with several effects exchanges them.
-        from analysis.diagnosis.search.exchange import exchange_effects
-
         return prune(context, exchange_effects(context, found, catalogue, progress, time_left), time_left)
 
     return context.guard.part(newest, "its last look", finish, nothing)

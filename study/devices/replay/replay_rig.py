@@ -1,4 +1,4 @@
-"""A recording as a rig: whatever force is commanded, the handle moves as recorded.
+"""A recording as a rig: the handle moves as recorded, independent of the commanded force.
 
 Before each stimulus the stretch is looked for whose recorded excitation is nearest to what shall be played (least
 squares over the whole stretch). Commands that were recorded so are answered exactly as they were then; others by the

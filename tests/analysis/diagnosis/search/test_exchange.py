@@ -7,8 +7,8 @@ import pytest
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.exchange import exchange_effects
 from analysis.diagnosis.search.explain import Explanation, retune_alone
+from analysis.diagnosis.search.revise_selection import exchange_effects
 from analysis.diagnosis.search.search import prune
 from analysis.diagnosis.search.time_budget import always
 from analysis.diagnosis.settings import SEARCH_ON

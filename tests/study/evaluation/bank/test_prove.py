@@ -82,7 +82,7 @@ def test_the_process_that_answers_never_loads_the_challenge(proof):
 def test_the_process_that_answers_reaches_no_label(proof, does, refused):
     script = (
         "from pathlib import Path\nfrom study.evaluation.bank.answer_cases import isolate_process\n"
-        f"cases = Path({str(proof[0].folder.open)!r})\nstay_apart(cases)\n{does}"
+        f"cases = Path({str(proof[0].folder.open)!r})\nisolate_process(cases)\n{does}"
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
     assert refused in done.stderr
