@@ -1,6 +1,6 @@
 """Adds a discovered law to a finished search where no catalogue effect is named, or where the law is far better."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -54,26 +54,35 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
     if fewer is not None:
         # A law too weak for these recordings to fix its numbers takes no other law's name away.
         found, is_open = fewer, False
-    rivals = _rivals(context, known)
-    if known.steps and may_stand_for_a_law(context, known):
-        harder = [rival for rival in rivals if not does_as_well_with_less(context, found, rival)]
-    else:
-        harder = rivals
-    reasons = reasons_against(context, found, harder)
-    if not all(beats(found.found.after, rival) for rival in harder):
-        reasons = (*reasons, "what the catalogue names leaves hardly more")
+    rivals, judged = _rivals(context, known), judge(checked)
+    reasons = (*_reasons_of_rivals(context, known, found, rivals), *_reasons_of_fit(found, checked))
     if is_open:
         reasons = (*reasons, "these recordings leave its numbers as good as open")
-    judged = judge(checked)
-    sealed = float(np.nanmax(checked.after.score.test, initial=0.0))
-    if sealed > NAMED_ERROR and not holds_elsewhere(checked):
-        reasons = (*reasons, f"on what was kept for the test it leaves {sealed:.3g} times the noise")
     if not judged.named:
         reasons = (*reasons, "what was kept for the test does not bear it out")
     if reasons:
         return replace(result, unconfirmed=(*result.unconfirmed, *_candidates(context, found, reasons)))
     remarks = (proof_sentence(context, checked, rivals, found.chosen_of),)
     return SearchResult(context, checked, judged, remarks, None if checked.errors is None else checked.errors[1])
+
+
+def _reasons_of_rivals(
+    context: SearchContext, known: Explanation, found: Discovery, rivals: Sequence[FittedCandidate]
+) -> Iterator[str]:
+    """Why the laws do not take the place of what the catalogue offers, and fail the checks of `proof`."""
+    if known.steps and may_stand_for_a_law(context, known):
+        rivals = [rival for rival in rivals if not does_as_well_with_less(context, found, rival)]
+    yield from reasons_against(context, found, rivals)
+    if not all(beats(found.found.after, rival) for rival in rivals):
+        yield "what the catalogue names leaves hardly more"
+
+
+def _reasons_of_fit(found: Discovery, checked: Explanation) -> Iterator[str]:
+    if not all(each.complete for each in found.rounds):
+        yield "the time ended before other laws were fitted"
+    held_out = float(np.nanmax(checked.after.score.test, initial=0.0))
+    if held_out > NAMED_ERROR and not holds_elsewhere(checked):
+        yield f"on what was kept for the test it leaves {held_out:.3g} times the noise"
 
 
 def _needs_law(result: SearchResult) -> bool:
@@ -99,8 +108,9 @@ def may_stand_for_a_law(context: SearchContext, named: Explanation) -> bool:
     forces = all(isinstance(claim.effect.acts, AxisForce) for claim in claims)
     if len(claims) > 1 and forces and len({claim.sites for claim in claims}) == 1:
         return True
-    evidence = gather_evidence(context.whole, context.tuning, fitted)[0]
-    return not all(is_within_data(fitted.hypothesis, k, evidence, PITCHES_SEEN) for k in range(len(claims)))
+    records = gather_evidence(context.whole, context.tuning, fitted)
+    seen = (any(is_within_data(fitted.hypothesis, k, of, PITCHES_SEEN) for of in records) for k in range(len(claims)))
+    return not all(seen)
 
 
 def _improves_held_out(found: Explanation) -> bool:

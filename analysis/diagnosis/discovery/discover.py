@@ -47,6 +47,8 @@ class Round:
     """The screened sums in the order of `fitted_candidates`."""
     placebo: float
     """Largest share of the held-out squares that a term takes of a time-shuffled missing force."""
+    complete: bool = True
+    """All of them were fitted before the time ended."""
 
     @property
     def shares_above_noise(self) -> tuple[float, float]:
@@ -132,7 +134,7 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
     # Of the axes that it acts along.
     own = [(each.acts_on, each.axis) for each in (first, first.partner) if each is not None]
     placebo = max((found.placebo for view, found in searched if (view.acts_on, view.axis) in own), default=0.0)
-    return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo)
+    return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo, time_left())
 
 
 def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:

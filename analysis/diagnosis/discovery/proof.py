@@ -22,7 +22,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_SAME, LAW_STABLE, LOUDER
+from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_SAME, LAW_STABLE, LOUDER, NOISE_KNOWN_TO
 from analysis.wording import conjoin
 from equalizer.effects.discovered_law import axis_names
 from equalizer.signals.recording import Segment
@@ -166,15 +166,17 @@ def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
 
 
 def does_as_well_with_less(context: SearchContext, of: Discovery, rival: FittedCandidate) -> bool:
-    """Whether the laws have fewer free numbers than a rival, and the data, held-out ones included, do not favour the
-    rival: of two descriptions that fit alike, the shorter (Rissanen, Automatica 14:465, 1978). Both with held-out
-    errors."""
+    """Whether the laws have fewer numbers than a rival, exponents that were rounded included, and leave no more error
+    than it where they were fitted and, within what the noise is known to, where they were not: of two descriptions that
+    fit alike, the shorter. Both with held-out errors."""
     law = of.found.after
-    more = len(rival.fitted.hypothesis.numbers) - len(law.fitted.hypothesis.numbers)
-    if more <= 0 or not inseparable(rival, law):
+    sums = [each for found in of.rounds for each in (found.sums[0], found.sums[0].partner) if each is not None]
+    numbers = sum(1 + len(term.numbers) for each in sums for term in each.terms)
+    if numbers >= len(rival.fitted.hypothesis.numbers) or not inseparable(rival, law):
         return False
     behind = held_out_gain(context.whole, law, rival)
-    return behind is not None and behind.low <= 0
+    worse = np.mean(np.log(law.score.test)) - np.mean(np.log(rival.score.test))
+    return behind is not None and behind.low <= 0 and bool(worse <= NOISE_KNOWN_TO)
 
 
 def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:

@@ -1,8 +1,13 @@
 """Optimal experiments to discriminate rivals: where they differ most after the rival was re-tuned.
 
 Hunter and Reiner (1965), with the information of the existing recordings as the prior of the rival's parameters. A
-difference that re-tuning of the rival removes within its tolerance does not count. Gains of several recordings add up:
-a rival that is re-tuned to all of them at once leaves no less than the sum of what it leaves of each.
+difference that re-tuning of the rival removes within its tolerance does not count.
+
+Several recordings: with residuals r_i of n recordings, sensitivities X_i and prior information K,
+
+    min over d of sum_i |r_i - X_i d|^2 + d' K d  >=  sum_i (min over d of |r_i - X_i d|^2 + d' (K / n) d),
+
+so that gains which were computed with the n-th part of the prior add up to a lower bound of what they gain together.
 """
 
 from collections.abc import Sequence
@@ -22,6 +27,8 @@ from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelErr
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
+MOST_TOGETHER = 3
+"""Recordings that are proposed at once."""
 RETUNED = 3
 """Gauss-Newton steps of the rival's re-tuning."""
 
@@ -41,7 +48,9 @@ class Bench:
 class PredictedGain:
     experiment: Experiment
     gain: float
-    """Expected log likelihood ratio in favour of the true effect."""
+    """Expected log likelihood ratio in favour of the true effect; 0 where a simulation diverged."""
+    shared: float = 0.0
+    """The same with a part of the prior information, as one of `MOST_TOGETHER` recordings."""
 
 
 def predict_gains(
@@ -49,11 +58,7 @@ def predict_gains(
 ) -> tuple[PredictedGain, ...]:
     """The experiments with their gains, in the menu's order. known: (t + numbers, t + numbers), information matrix of
     the rival's numbers from what has been recorded, calibration included."""
-    return tuple(PredictedGain(experiment, _gain(bench, named, rival, known, experiment)) for experiment in menu)
-
-
-MOST_TOGETHER = 3
-"""Recordings that are proposed at once."""
+    return tuple(PredictedGain(experiment, *_gains(bench, named, rival, known, experiment)) for experiment in menu)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,31 +71,48 @@ class ExperimentSet:
 
 
 def choose_set(foreseen: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
-    """The recordings that discriminate as many rivals as the menu can; empty where it discriminates none. A single
-    one where one is enough, that with the largest gain per cost; else the one first that adds most, per cost, to what
-    is still missing (greedy set cover). foreseen: per rival, the gains of one menu, in its order."""
-    gains = np.array([[each.gain for each in of] for of in foreseen]).reshape(len(foreseen), -1)
-    most = np.sort(gains, axis=1)[:, -MOST_TOGETHER:].sum(axis=1)
-    within_reach = np.flatnonzero(most >= TELLING_GAIN)
-    if not len(within_reach):
-        return ExperimentSet((), (), 0.0)
-    menu = [each.experiment for each in foreseen[0]]
+    """The recordings to make for rivals of one effect; empty where none would discriminate. A single one where one
+    discriminates all that can be, that with the largest gain per cost; else the one first that adds most, per cost, to
+    what is still missing (greedy set cover). foreseen: per rival, the gains of one menu, in its order."""
+    alone, shared = (
+        np.array([[float(getattr(each, name)) for each in of] for of in foreseen]).reshape(len(foreseen), -1)
+        for name in ("gain", "shared")
+    )
+    menu = [each.experiment for each in foreseen[0]] if len(foreseen) else []
     cost = np.array([experiment.minutes for experiment in menu])
-    wanted = gains[within_reach]
+    most = np.maximum(alone.max(axis=1, initial=0.0), np.sort(shared, axis=1)[:, -MOST_TOGETHER:].sum(axis=1))
+    wanted = [int(number) for number in np.argsort(-most, kind="stable") if most[number] >= TELLING_GAIN]
+    # Without the hardest rival, where all together are out of reach.
+    while wanted:
+        chosen = _single(alone[wanted], cost) or _cover(shared[wanted], cost)
+        if chosen:
+            told = tuple(sorted(wanted))
+            gain = alone[wanted][:, chosen].min() if len(chosen) == 1 else shared[wanted][:, chosen].sum(axis=1).min()
+            return ExperimentSet(tuple(menu[number] for number in chosen), told, float(gain))
+        wanted.pop()
+    return ExperimentSet((), (), 0.0)
+
+
+def _single(gains: FloatArray, cost: FloatArray) -> list[int]:
+    """The recording that discriminates every rival by itself, with the largest gain per cost; empty where none does."""
+    weakest = gains.min(axis=0)
+    if not (weakest >= TELLING_GAIN).any():
+        return []
+    return [int(np.argmax(np.where(weakest >= TELLING_GAIN, weakest / cost, -np.inf)))]
+
+
+def _cover(gains: FloatArray, cost: FloatArray) -> list[int]:
+    """A few recordings that discriminate every rival together; empty where as many as `MOST_TOGETHER` do not."""
     chosen: list[int] = []
-    weakest = wanted.min(axis=0)
-    if (weakest >= TELLING_GAIN).any():
-        chosen = [int(np.argmax(np.where(weakest >= TELLING_GAIN, weakest / cost, -np.inf)))]
-    while len(chosen) < MOST_TOGETHER and (have := wanted[:, chosen].sum(axis=1)).min() < TELLING_GAIN:
-        added = np.minimum(wanted, np.maximum(TELLING_GAIN - have, 0.0)[:, None]).sum(axis=0) / cost
+    while (missing := np.maximum(TELLING_GAIN - gains[:, chosen].sum(axis=1), 0.0)).any():
+        if len(chosen) == min(MOST_TOGETHER, len(cost)):
+            return []
+        added = np.minimum(gains, missing[:, None]).sum(axis=0) / cost
         added[chosen] = -np.inf
         chosen.append(int(np.argmax(added)))
-    reached = wanted[:, chosen].sum(axis=1)
-    told = reached >= TELLING_GAIN
-    if not told.any():
-        return ExperimentSet((), (), 0.0)
-    experiments = tuple(menu[number] for number in chosen)
-    return ExperimentSet(experiments, tuple(within_reach[told].tolist()), float(reached[told].min()))
+    needless = (k for k in chosen if (gains[:, [j for j in chosen if j != k]].sum(axis=1) >= TELLING_GAIN).all())
+    dropped = next(needless, None)
+    return [number for number in chosen if number != dropped]
 
 
 def as_document(best: ExperimentSet, names: Sequence[str]) -> NextExperiment | None:
@@ -110,7 +132,10 @@ def as_document(best: ExperimentSet, names: Sequence[str]) -> NextExperiment | N
     )
 
 
-def _gain(bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, experiment: Experiment) -> float:
+def _gains(
+    bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, experiment: Experiment
+) -> tuple[float, float]:
+    """Gain by itself, and as one of several recordings."""
     base = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment)
     differs = _simulate(bench, named.deviations, named.hypothesis, named.hypothesis.point, experiment) - base
     columns = []
@@ -122,7 +147,14 @@ def _gain(bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, experim
         point = rival.hypothesis.point.copy()
         point[number] += of.move
         columns.append((_simulate(bench, rival.deviations, rival.hypothesis, point, experiment) - base) / of.move)
-    return _squares_after_retuning(bench, rival, known, (experiment, differs, np.array(columns))) / 2
+    moves = np.array(columns)
+    if not (np.isfinite(differs).all() and np.isfinite(moves).all()):
+        return 0.0, 0.0
+    alone, shared = (
+        _squares_after_retuning(bench, rival, of, (experiment, differs, moves)) / 2
+        for of in (known, known / MOST_TOGETHER)
+    )
+    return alone, min(shared, alone)
 
 
 def _squares_after_retuning(

@@ -74,17 +74,24 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
             "sweep",
             minutes=1.5,
         ),
-        *(_pushes(sweep, level, swept(level / 2), fade) if _is_held(model, axis) else ()),
+        *(_pushes(sweep, level, swept(level / 2), fade) if _is_held(model, axis, slowest_hz) else ()),
         Experiment(
             f"{sweep} at {level:.3g} with {_weight_words(model, added)}", swept(level), "sweep", added, minutes=3.0
         ),
     )
 
 
-def _is_held(model: MechanicalModel, axis: int) -> bool:
-    """Whether a stiffness holds the axis: a constant force would drive another one away."""
+def _is_held(model: MechanicalModel, axis: int, slowest_hz: float) -> bool:
+    """Whether a constant force moves the axis at most twice as far as a sinusoid of the sweep's lowest frequency does.
+    One that no stiffness holds, or a soft one, would be driven away."""
     axes = driven_axes(model)[:, axis]
-    return bool(axes @ model.stiffness @ axes > 0)
+    s = 2j * np.pi * slowest_hz
+    try:
+        still = np.linalg.solve(model.stiffness, axes)
+        moving = np.linalg.solve(model.mass * s**2 + model.damping * s + model.stiffness, axes)
+    except np.linalg.LinAlgError:
+        return False
+    return bool(0 < axes @ still <= 2 * abs(axes @ moving))
 
 
 def _pushes(sweep: str, level: float, half: FloatArray, fade: int) -> tuple[Experiment, Experiment]:

@@ -54,7 +54,10 @@ def propose_experiment(context: SearchContext, found: Explanation) -> Proposal |
         record = context.measure.records[0]
         sensed = place_of_effect(claim.effect) == "sensor"
         axis = min(claim.sites[0], record.command.shape[1] - 1) if sensed else claim.sites[0]
-        level = float(np.abs(record.command).max())
+        # No louder than that axis was driven.
+        level = max(float(np.abs(each.command[:, axis]).max()) for each in context.measure.records)
+        if level == 0:
+            continue
         rate_hz = record.recording.sample_rate_hz
         bench = Bench(context.tuning, rate_hz, record.recording.hold, context.measure.noise)
         menu = experiment_menu(context.tuning.model, rate_hz, axis, level)

@@ -168,8 +168,10 @@ def next_experiment_sentence(diagnosis: Diagnosis) -> str:
     if wanted is None:
         alike = any(rival.inseparable for effect in diagnosis.effects for rival in effect.rivals)
         return "No further recording is foreseen to tell apart what these data cannot." if alike else ""
-    splits = f"would tell {conjoin([noun_of(name) for name in wanted.splits])} apart" if wanted.splits else "would help"
-    return f"The recording that {splits}: {wanted.command}. {capitalise(end_sentence(wanted.why))}"
+    named, *rivals = (noun_of(name) for name in wanted.splits) if wanted.splits else ("",)
+    splits = f"would tell {named} from {conjoin(rivals)}" if rivals else "would help"
+    subject = "The recordings" if "; then " in wanted.command else "The recording"
+    return f"{subject} that {splits}: {wanted.command}. {capitalise(end_sentence(wanted.why))}"
 
 
 def share_sentence(effect: NamedEffect) -> str:

@@ -30,7 +30,7 @@ from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, gather_
 from analysis.diagnosis.search.compare_candidates import compare_candidates, refine
 from analysis.diagnosis.search.no_prediction import predicts_nothing
 from analysis.diagnosis.search.parsimony import excludes, plainest_first
-from analysis.diagnosis.search.same_within_errors import excess
+from analysis.diagnosis.search.same_within_errors import excess, inseparable
 from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
 from analysis.diagnosis.search.search_context import (
     FITTING,
@@ -57,6 +57,9 @@ from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
+
+MOST_REFITTED_RIVALS = 3
+"""Rivals of a step that are fitted again where a search goes on with more samples; each takes a second or more."""
 
 
 def fits_on_short_recordings(
@@ -150,18 +153,18 @@ def explain(
     catalogue: Sequence[Effect],
     progress: Progress,
     time_left: TimeBudget = always,
-    begun: Sequence[FittedCandidate] = (),
+    begun: Sequence[Sequence[FittedCandidate]] = (),
 ) -> Explanation:
     """Re-tunes the model and adds effects one by one. time_left: asked before each piece of the search; what was found
-    when it says no is kept. begun: the steps of a search on fewer samples, which this one goes on from."""
+    when it says no is kept. begun: per step of a search on fewer samples, it and its rivals: where this one begins."""
     before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
     retuned = _retune(context, before)
     base = context.candidate(retuned)
     confirmed = context.with_test_score(base)
     surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > HELD_OUT_SURPRISE)
-    steps = _known_steps(context, base, begun)
-    rounds: list[tuple[FittedCandidate, ...]] = [(step,) for step in steps]
+    rounds = _known_rounds(context, base, begun)
+    steps = [each[0] for each in rounds]
     base = steps[-1] if steps else base
     barred, ended_early = "", False
     within_time = replace(context, map_=limit_map(context.map_, time_left))
@@ -188,17 +191,25 @@ def explain(
     return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
 
 
-def _known_steps(
-    context: SearchContext, base: FittedCandidate, begun: Sequence[FittedCandidate]
-) -> list[FittedCandidate]:
-    """Fits of what is not searched for: the certain hypotheses, and the steps of a search on fewer samples."""
-    steps: list[FittedCandidate] = []
+def _known_rounds(
+    context: SearchContext, base: FittedCandidate, begun: Sequence[Sequence[FittedCandidate]]
+) -> list[tuple[FittedCandidate, ...]]:
+    """Rounds of what is not searched for: the certain hypotheses, and the steps of a search on fewer samples with those
+    rivals that these could not tell from them, all refitted."""
+    rounds: list[tuple[FittedCandidate, ...]] = []
     for hypothesis in context.certain:
-        steps.append(_add_certain(context, steps[-1] if steps else base, hypothesis))
-    for step in begun:
-        start = evaluate_fit(context.measure, context.tuning, step.fitted.deviations, step.fitted.hypothesis)
-        steps.append(context.candidate(refine(context, start)))
-    return steps
+        base = _add_certain(context, base, hypothesis)
+        rounds.append((base,))
+    for step, *others in begun:
+        rivals = [other for other in others if inseparable(step, other)]
+        rounds.append(tuple(_refit(context, each) for each in (step, *rivals[:MOST_REFITTED_RIVALS])))
+    return rounds
+
+
+def _refit(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
+    fitted = candidate.fitted
+    start = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
+    return context.candidate(refine(context, start))
 
 
 def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:

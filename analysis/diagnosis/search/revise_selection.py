@@ -2,7 +2,8 @@
 
 Forward selection chooses the first effect for what all of them do together, so that it may be a compromise. With the
 second effect held, the first is looked for again; where another one fits better, it takes the first one's place, and
-the second is looked for again beside it, until nothing changes (Miller, Subset Selection in Regression, 2002, ch. 3).
+the second is looked for again beside it, as often as there are effects (Miller, Subset Selection in Regression, 2002,
+ch. 3).
 """
 
 from collections.abc import Sequence
@@ -48,7 +49,7 @@ def exchange_effects(
     fits better."""
     limited = replace(context, map_=limit_map(context.map_, time_left))
     fixed = context.certain or context.references is not None or found.ended_early or found.barred
-    for _ in found.steps[1:]:
+    for _ in found.steps:
         if fixed or len(found.steps) < 2 or found.after.score.worst_channel <= SEARCH_ON or not time_left():
             break
         better = _exchange_first(limited, found, catalogue, progress)
@@ -62,14 +63,15 @@ def _exchange_first(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress
 ) -> Explanation | None:
     """The explanation with its first effect replaced by what fits better beside the others; None where nothing does."""
-    kept = without_effect(context, found, 0)
     step = Step("looking again for the first effect", 0.8, progress)
     try:
+        kept = without_effect(context, found, 0)
         tried = find_next_effect(context, catalogue, kept.steps[-1].fitted, step)
     except OutOfTimeError:
         return None
     named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
     if not named or named[0] is not tried[0] or not is_worthwhile(found.steps[-1], named[0]):
         return None
-    rounds = (*kept.rounds[: len(kept.steps)], named)
+    # What was compared with the former first effect are no rivals of the one that is first now.
+    rounds = (kept.rounds[0][:1], *kept.rounds[1 : len(kept.steps)], named)
     return replace(kept, after=context.with_test_score(named[0]), rounds=rounds, steps=(*kept.steps, named[0]))

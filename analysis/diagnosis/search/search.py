@@ -146,7 +146,9 @@ def search_effects(
     opened = _find_with_opened(first, left, catalogue, progress, time_left)
     adds = _adds_confirmed(first, opened)
     if adds and (judged.named or opened.judgement.verdict == "explained"):
-        return beyond(opened)
+        there = beyond(opened)
+        said = tuple(remark for remark in opened.remarks[:1] if remark not in there.remarks)
+        return replace(there, remarks=(*said, *there.remarks))
     if judged.named:
         return beyond(first)
     return _find_beyond(first, opened, adds, beyond)
@@ -175,11 +177,12 @@ def _find_with_opened(
     where the others show the mismatch, else the first half of each."""
     milder = first.context.open_milder(left)
     context = first.context.open_half() if milder is None else milder
-    begun = first.found.steps if left is first.found.after and as_good_as_noise(first.found) else ()
+    going_on = left is first.found.after and as_good_as_noise(first.found)
+    begun = first.found.rounds[: len(first.found.steps)] if going_on else ()
     found = _explain_and_prune(context, catalogue, progress, time_left, begun)
     if begun and not as_good_as_noise(found) and time_left():
         anew = _explain_and_prune(context, catalogue, progress, time_left)
-        found = min(found, anew, key=lambda each: each.after.score.mean_log_error)
+        found = min(found, anew, key=lambda each: (not as_good_as_noise(each), each.after.score.mean_log_error))
     used = TEST_HALF_USED if milder is None else MILDER_TEST_USED
     return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
 
@@ -209,7 +212,7 @@ def _explain_and_prune(
     catalogue: Sequence[Effect],
     progress: Progress,
     time_left: TimeBudget,
-    begun: Sequence[FittedCandidate] = (),
+    begun: Sequence[Sequence[FittedCandidate]] = (),
 ) -> Explanation:
     """Forward selection, exchange and backward elimination; where the last two crash, nothing is named. begun: as for
     `explain`."""
@@ -217,10 +220,11 @@ def _explain_and_prune(
     nothing = replace(found, after=found.retuned, steps=())
     newest = found.steps[-1].newest if found.steps else ""
 
-    def finish() -> Explanation:
-        return prune(context, exchange_effects(context, found, catalogue, progress, time_left), time_left)
+    def exchange() -> Explanation:
+        return exchange_effects(context, found, catalogue, progress, time_left)
 
-    return context.guard.part(newest, "its last look", finish, nothing)
+    exchanged = context.guard.part(newest, "its exchange", exchange, found)
+    return context.guard.part(newest, "its last look", lambda: prune(context, exchanged, time_left), nothing)
 
 
 def _remarks(found: Explanation) -> tuple[str, ...]:

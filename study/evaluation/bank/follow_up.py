@@ -83,7 +83,9 @@ def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcom
     if proposal is not None:
         model = read_mechanical_model(place / MODEL)
         menu = experiment_menu(model, RATE_HZ, proposal["axis"], proposal["level"])
-        proposed = [each for each in menu if each.words in proposal["best"]]
+        best = proposal["best"]
+        wanted_words = [best] if isinstance(best, str) else best or ()  # one text in answers of older versions
+        proposed = [each for each in menu if each.words in wanted_words]
         order = np.random.default_rng([plan.seed, start.number, NOISE_SEED]).permutation(len(menu))
         drawn = [menu[number] for number in order[: max(len(proposed), 1)]]
         wanted = {DRAWN: drawn} | ({PROPOSED: proposed} if proposed else {})

@@ -85,7 +85,8 @@ def _next(diagnosis: Diagnosis) -> str:
     following = diagnosis.next_experiment
     if following is None:
         return ""
-    splits = f" It tells {conjoin([noun_of(name) for name in following.splits])} apart." if following.splits else ""
+    named, *rivals = (noun_of(name) for name in following.splits) if following.splits else ("",)
+    splits = f" This tells {named} from {conjoin(rivals)}." if rivals else ""
     return f"{following.command}\n{following.why}{splits}"
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.discovery.add_laws import add_laws, may_stand_for_a_law
+from analysis.diagnosis.discovery.add_laws import add_laws, may_stand_for_a_law, weigh_laws
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.discovery.proof import does_as_well_with_less
@@ -73,10 +73,19 @@ def test_several_forces_on_one_axis_may_be_one_law_and_a_force_and_a_sensor_may_
     assert not may_stand_for_a_law(hardened[0], named(hardened, cube, claim("sensor_gain", gain=1.01)))
 
 
+def test_an_exponent_that_was_rounded_counts_as_a_number(hardened):
+    context, _ = hardened
+    cube, drag = claim("hardening_stiffness", k3=CUBIC), claim("quadratic_damping", coefficient=0.1)
+    two = named(hardened, cube, drag)
+    found = discover(context, two, quiet, always, 1)
+    assert len(found.found.after.fitted.hypothesis.numbers) < len(two.after.fitted.hypothesis.numbers) == 2
+    assert not does_as_well_with_less(context, found, two.after)
+
+
 def test_the_shorter_law_takes_the_place_of_names_that_fit(hardened):
     context, _ = hardened
-    cube, drag = claim("hardening_stiffness", k3=CUBIC), claim("quadratic_damping", coefficient=1e-4)
-    names = named(hardened, cube, drag)
+    cube, stop = claim("hardening_stiffness", k3=CUBIC), claim("end_stop", position=1.0, stiffness=1e3, opposite=1.0)
+    names = named(hardened, cube, stop)
     assert judge(names).verdict == "explained"
     said = add_laws(SearchResult(context, names, judge(names)), quiet, always)
     (found,) = laws_of(said.found.after.fitted.hypothesis)
@@ -92,6 +101,17 @@ def test_a_name_that_is_as_short_stays(hardened):
     assert add_laws(result, quiet, always) is result
     found = discover(context, cube, quiet, always, 1)
     assert not does_as_well_with_less(context, found, cube.after)
+
+
+def test_a_law_whose_rivals_were_not_fitted_is_a_candidate(hardened):
+    context, _ = hardened
+    names = named(hardened, claim("quadratic_damping", coefficient=0.1))
+    found = discover(context, names, quiet, always)
+    begun = replace(found, rounds=tuple(replace(each, complete=False) for each in found.rounds))
+    for discovery, is_named in ((found, True), (begun, False)):
+        said = weigh_laws(SearchResult(context, names, judge(names)), discovery, always)
+        assert any(law is not None for law in laws_of(said.found.after.fitted.hypothesis)) == is_named
+    assert any("time ended" in each.why_not for each in said.unconfirmed)
 
 
 def test_a_search_whose_time_ends_within_a_fit_keeps_what_it_has(hardened):

@@ -107,7 +107,7 @@ def test_a_law_and_itself_are_never_told_apart(friction):
 def gains_of(*rows):
     """Per rival, invented gains of the first recordings of a menu."""
     menu = experiment_menu(bench_of().tuning.model, RATE_HZ, 0, LEVEL_N)
-    return [[PredictedGain(menu[number], gain) for number, gain in enumerate(row)] for row in rows]
+    return [[PredictedGain(menu[number], gain, gain) for number, gain in enumerate(row)] for row in rows]
 
 
 def words_of(chosen):
@@ -149,7 +149,23 @@ def test_a_rival_that_nothing_tells_does_not_hinder_the_others():
 def test_no_more_recordings_are_proposed_than_a_laboratory_would_make():
     small = 0.3 * TELLING_GAIN
     assert choose_set(gains_of([small, small, small, small])).experiments == ()
-    assert len(choose_set(gains_of(*np.diag([TELLS] * 5).tolist())).experiments) == MOST_TOGETHER
+    chosen = choose_set(gains_of(*np.diag([TELLS] * 5).tolist()))
+    assert len(chosen.experiments) == len(chosen.told) == MOST_TOGETHER
+
+
+def test_a_recording_that_no_rival_needs_is_not_proposed():
+    assert words_of(choose_set(gains_of([TELLS, 0, 0, 0], [0, HALF, HALF, 0]))) == [0, 1, 2]
+    third = 0.4 * TELLING_GAIN
+    assert words_of(choose_set(gains_of([TELLS, 0, 0, 0], [0.0, third, third, third]))) == [0]
+
+
+def test_the_prior_is_counted_once_for_several_recordings():
+    """Two equal recordings, whose difference the tolerance of a calibration can hide: r = d - s * theta, K = 1."""
+    bench, named, rival = mass_or_gain(LOOSE)
+    menu = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)[:2]
+    gains = predict_gains(bench, named, rival, known_of(bench, rival, 1e9), menu)
+    assert all(0 <= each.shared <= each.gain for each in gains)
+    assert any(each.shared < 0.9 * each.gain for each in gains)
 
 
 ADDED_KG, GAIN = 0.012, 0.955
@@ -231,6 +247,17 @@ def test_an_axis_that_no_stiffness_holds_is_not_pushed_away():
     ]
     assert pushes == [1, 0]
     assert [each.kind for each in experiment_menu(held, RATE_HZ, 0, LEVEL_N)].count("step") == 1
+
+
+def test_a_body_on_a_spring_to_another_free_body_is_not_held():
+    """Its stiffness matrix has a diagonal, and nothing grounds it."""
+    mass, spring = 0.2 * np.eye(2), 1e4 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    one = [[1.0], [0.0]]
+    free = MechanicalModel("two", "acceleration", mass, 0.4 * np.eye(2), spring, one, np.transpose(one))
+    soft = replace(free, stiffness=spring + 0.05 * np.eye(2))
+    held = replace(free, stiffness=spring + 500.0 * np.eye(2))
+    kinds = [[each.kind for each in experiment_menu(model, RATE_HZ, 0, LEVEL_N)] for model in (free, soft, held)]
+    assert [each.count("step") for each in kinds] == [0, 0, 1]
 
 
 def test_a_release_ends_at_once_and_leaves_time_to_move_freely():

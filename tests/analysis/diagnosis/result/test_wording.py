@@ -221,7 +221,7 @@ def test_the_next_recording_says_what_it_would_tell_apart():
     wanted = NextExperiment("hapteq record slow.toml --out slow.h5", ("coulomb_friction", "stribeck_friction"),
                             "only slow motion shows the hump")  # fmt: skip
     assert next_experiment_sentence(diagnosis("explained", (DRY,), next_=wanted)) == (
-        "The recording that would tell dry friction and friction that is larger at rest (Stribeck) apart: hapteq "
+        "The recording that would tell dry friction from friction that is larger at rest (Stribeck): hapteq "
         "record slow.toml --out slow.h5. Only slow motion shows the hump."
     )
     assert next_experiment_sentence(diagnosis("explained", (DRY,))) == (

@@ -10,7 +10,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.revise_selection import exchange_effects
 from analysis.diagnosis.search.search import prune
-from analysis.diagnosis.search.time_budget import always
+from analysis.diagnosis.search.time_budget import CountedBudget, always
 from analysis.diagnosis.settings import SEARCH_ON
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -71,6 +71,19 @@ def test_the_first_effect_is_looked_for_again_beside_the_second(limited_and_late
 def test_without_time_or_a_better_effect_nothing_is_exchanged(limited_and_late, compromised):
     assert exchange_effects(limited_and_late, compromised, CATALOGUE, quiet, lambda: False) is compromised
     assert exchange_effects(limited_and_late, compromised, CATALOGUE[:2], quiet, always) is compromised
+
+
+@pytest.mark.parametrize("asked", [1, 2, 3, 5, 8])
+def test_an_exchange_whose_time_ends_changes_nothing(limited_and_late, compromised, asked):
+    found = exchange_effects(limited_and_late, compromised, CATALOGUE, quiet, CountedBudget(asked))
+    assert found is compromised
+
+
+def test_a_discarded_effect_is_no_rival_of_the_one_that_stays(limited_and_late, compromised):
+    lag = found_of(limited_and_late, claim("amplifier_lag", time_constant=3e-3)).steps
+    rivals = replace(compromised, rounds=((*compromised.rounds[0], *lag), *compromised.rounds[1:]))
+    found = exchange_effects(limited_and_late, rivals, CATALOGUE, quiet, always)
+    assert [each.newest for each in found.rounds[0]] == [found.steps[0].newest]
 
 
 def test_an_effect_that_is_not_to_be_named_takes_no_place(limited_and_late, compromised):

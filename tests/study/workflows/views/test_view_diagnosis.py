@@ -31,7 +31,7 @@ ERRORS = Errors(0.3, 0.28, 0.05, None)
 FOUND = Diagnosis(
     "partly_explained", (PLACE,), (FRICTION,), {"mass": 0.2}, (replace(PLACE, amplitude=None, state=None),),
     Fit(ERRORS, ERRORS), "free simulation",
-    NextExperiment("hapteq record slow --out N.h5", ("coulomb_friction",), "Slow."),
+    NextExperiment("hapteq record slow --out N.h5", ("coulomb_friction", "stribeck_friction"), "Slow."),
 )  # fmt: skip
 
 
@@ -66,7 +66,7 @@ def test_a_p_value_of_zero_is_shown_as_an_upper_bound(tmp_path):
 
 def test_the_next_experiment_begins_with_its_command(view):
     assert view.next_experiment.splitlines()[0] == "hapteq record slow --out N.h5"
-    assert "It tells dry friction apart" in view.next_experiment
+    assert view.next_experiment.endswith("This tells dry friction from friction that is larger at rest (Stribeck).")
     assert "free simulation" in view.notes[0]
     assert view.notes[-1].startswith("Still unexplained: ax at 5 to 15 Hz")
 
