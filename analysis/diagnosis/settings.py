@@ -153,6 +153,7 @@ IMPACTS_AS_GOOD = 1.1  # times the named one's misfit, up to which a rival is as
 # Numbers and probabilities of what is named (`named_effects`).
 MOST_RIVALS = 6
 INTERVAL_FACTOR, INTERVAL_SHARE = 2.5, 0.005  # of the noise's, and of the number. Bank 91000: noise alone held 65 %
+MOST_BETWEEN_SEGMENTS = 5.0  # times the noise's standard error; jackknife over segments. Set on 99700 (docs/proof.md)
 PROBABILITY_SCALE = 0.002  # gain that makes a candidate e times less likely. Bank (docs/proof.md), as the next two
 ELSEWHERE_LEAST, ELSEWHERE_MOST = 0.01, 0.8  # chance that none is right: where noise is left, where much more is
 ELSEWHERE_HALFWAY, ELSEWHERE_STEEPNESS = 0.35, 1.5  # error above noise at which that is even, and how fast it turns

@@ -1,8 +1,14 @@
 """Standard errors of a fit that hold where residuals are neither white nor of the assumed variance.
 
-Sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches longer than the residuals'
-correlation time.
+Noise: sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches longer than the residuals'
+correlation time. Systematic errors: no law is exact, so that another level or axis would give other numbers; delete-one
+jackknife over segments (Efron and Stein, Ann. Stat. 9:586, 1981), each estimate by one Gauss-Newton step,
+
+    theta_g - theta = -(A - A_g)^-1 b_g,   A = sum of A_g + prior,   A_g = X_g X_g',   b_g = X_g r_g.
 """
+
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,6 +39,39 @@ def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known
     scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
     return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ middle @ inverse), 0.0)))
+
+
+def segment_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known: Sensitivity) -> FloatArray | None:
+    """(t + numbers,): jackknife standard errors over segments; None where there is one segment."""
+    errors = residuals_to_fit(measure, fitted.residuals)
+    own = hypothesis_sensitivity(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
+    products, pulls = [], []
+    for begin, end in _segments(measure):
+        moves = np.vstack([known.over(begin, end), own[:, begin:end]])
+        products.append(moves @ moves.T)
+        pulls.append(moves @ errors[begin:end])
+    if len(products) < 2:
+        return None
+    whole, t = np.sum(products, axis=0), len(fitted.deviations)
+    whole[:t, :t] += np.eye(t)
+    scale = np.sqrt(np.maximum(np.diagonal(whole), np.finfo(float).tiny))
+    left_out = []
+    for part, pull in zip(products, pulls, strict=True):
+        rest = (whole - part) / np.outer(scale, scale)
+        left_out.append(np.linalg.pinv(rest, rcond=1e-12, hermitian=True) @ (pull / scale) / scale)
+    moved, count = np.array(left_out), len(left_out)
+    return np.asarray(np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)))
+
+
+def _segments(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
+    """Ranges of the residuals to fit, one per segment with the rest after it, or per recording without segments."""
+    first = 0
+    for record in measure.records:
+        width, samples = record.measured.shape[1], np.flatnonzero(record.fit)
+        starts = np.sort([segment.start for segment in record.recording.segments[1:]])
+        edges = [0, *np.searchsorted(samples, starts), len(samples)]
+        yield from ((first + width * a, first + width * b) for a, b in pairwise(edges) if b > a)
+        first += width * len(samples)
 
 
 def _at_an_end(hypothesis: Hypothesis) -> Mask:

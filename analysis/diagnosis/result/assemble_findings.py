@@ -25,11 +25,11 @@ from analysis.diagnosis.result.post_search import examine_fits
 from analysis.diagnosis.result.unconfirmed import with_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.identifiability import final_errors
+from analysis.diagnosis.search.identifiability import final_errors, interval_errors
 from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement
-from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE
+from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import axis_letter, model_effects
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -146,7 +146,7 @@ def _document(
         or (
             () if judged.verdict == "no_mismatch" else whole_mismatch(measure, found.before.score, found.before.fitted)
         ),
-        effects=_effects_with_gains(result, errors[len(tuning.names) :], labels) if judged.named else (),
+        effects=_effects_with_gains(result, errors, labels) if judged.named else (),
         retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judged.verdict not in ("partly_explained", "unexplained")
@@ -159,10 +159,18 @@ def _document(
     )
 
 
+def _interval_errors(result: SearchResult, errors: FloatArray) -> FloatArray:
+    """(numbers,): standard errors of the named effects' numbers for the intervals that are stated."""
+    own = len(result.context.tuning.names)
+    if result.found.statistic is not None:
+        return INTERVAL_FACTOR * errors[own:]
+    return interval_errors(result.context, result.found, errors)[own:]
+
+
 def _effects_with_gains(result: SearchResult, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
     """The named effects, with their gains on held-out data where samples were compared."""
     context, found = result.context, result.found
-    effects = named_effects(found, errors, labels)
+    effects = named_effects(found, _interval_errors(result, errors), labels)
     if found.statistic is not None or len(found.steps) != len(effects):
         return effects
     between = [context.with_test_score(step) for step in found.steps[:-1]]

@@ -19,7 +19,6 @@ from analysis.diagnosis.settings import (
     ELSEWHERE_MOST,
     ELSEWHERE_STEEPNESS,
     EXPLAINED_BY_CHANCE,
-    INTERVAL_FACTOR,
     INTERVAL_SHARE,
     MOST_RIVALS,
     PROBABILITY_SCALE,
@@ -62,7 +61,7 @@ def labels_of(recording: Recording, model: MechanicalModel) -> Labels:
 
 def named_effects(found: Explanation, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
     """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (numbers,), standard
-    errors of the hypothesis's point."""
+    errors of the hypothesis's point for its intervals (`interval_errors`)."""
     whole, named, first = found.after.fitted.hypothesis, [], 0
     shares = shares_taken(found.retuned, found.steps)
     for number, claim in enumerate(whole.claims):
@@ -180,9 +179,7 @@ def law_of_claim(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw |
 
 
 def _interval(value: float, standard_error: float) -> tuple[float, float] | None:
-    reach = (
-        float(np.hypot(1.96 * INTERVAL_FACTOR * standard_error, INTERVAL_SHARE * value)) if standard_error > 0 else 0.0
-    )
+    reach = float(np.hypot(1.96 * standard_error, INTERVAL_SHARE * value)) if standard_error > 0 else 0.0
     return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
 
 

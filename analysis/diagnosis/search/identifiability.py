@@ -14,14 +14,19 @@ import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Number
-from analysis.diagnosis.errors.intervals import STRETCH_S, standard_errors
-from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
+from analysis.diagnosis.errors.intervals import STRETCH_S, segment_errors, standard_errors
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
 from analysis.diagnosis.search.revise_selection import without_effect
 from analysis.diagnosis.search.search_context import SearchContext, sensitivity_at
 from analysis.diagnosis.search.short_recordings import short_recordings_of
-from analysis.diagnosis.settings import INTERVAL_FACTOR, REPLACEMENTS_TRIED, UNDETERMINED_REACH
+from analysis.diagnosis.settings import (
+    INTERVAL_FACTOR,
+    MOST_BETWEEN_SEGMENTS,
+    REPLACEMENTS_TRIED,
+    UNDETERMINED_REACH,
+)
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
@@ -41,13 +46,29 @@ def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
     last = found.steps[-1] if found.steps else found.retuned
     if found.errors is not None and found.errors[0] is last.fitted:
         return found.errors[1]
-    fitted = evaluate_fit(context.measure, context.tuning, last.fitted.deviations, last.fitted.hypothesis)
+    fitted, known = _with_sensitivity(context, last.fitted)
+    return standard_errors(context.measure, context.tuning, fitted, known)
+
+
+def interval_errors(context: SearchContext, found: Explanation, noise: FloatArray) -> FloatArray:
+    """(t + numbers,): standard errors for the intervals that are stated. noise: `final_errors`, or their profiles. To
+    these comes what varies between segments, up to a few times the noise's: with few segments a jackknife has heavy
+    tails. A single segment tells nothing of that, and a factor stands for it."""
+    last = found.steps[-1] if found.steps else found.retuned
+    between = segment_errors(context.measure, context.tuning, *_with_sensitivity(context, last.fitted))
+    if between is None:
+        return INTERVAL_FACTOR * noise
+    return np.asarray(np.hypot(noise, np.minimum(between, MOST_BETWEEN_SEGMENTS * noise)))
+
+
+def _with_sensitivity(context: SearchContext, last: Fitted) -> tuple[Fitted, Sensitivity]:
+    """The fit on the samples to fit and to choose by, with the sensitivity to the model's own numbers."""
+    fitted = evaluate_fit(context.measure, context.tuning, last.deviations, last.hypothesis)
     single = context.tuning.model.coordinates == 1
     short_form = short_recordings_of(context, fitted)
     near = context if short_form is None else short_form.context
     known = sensitivity_at(near, fitted.deviations, fitted.hypothesis, with_forces=single)
-    known = known if short_form is None else short_form.repeat_sensitivity(known)
-    return standard_errors(context.measure, context.tuning, fitted, known)
+    return fitted, known if short_form is None else short_form.repeat_sensitivity(known)
 
 
 def keep_identifiable(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:

@@ -11,12 +11,12 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
-from analysis.diagnosis.errors.intervals import standard_errors
+from analysis.diagnosis.errors.intervals import segment_errors, standard_errors
 from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.recording import Recording
+from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
 RATE_HZ, SAMPLES, DRAWS = 200.0, 4000, 120
@@ -101,3 +101,61 @@ def test_what_the_data_say_of_the_model_outweighs_its_calibration():
 
 def test_the_same_record_gives_the_same_interval():
     assert np.array_equal(fitted_and_errors(5, 0.9, 1.0)[1], fitted_and_errors(5, 0.9, 1.0)[1])
+
+
+SEGMENTS, VARIES = 8, 0.15
+
+
+def of_segments(seed, varies, count=SEGMENTS):
+    """White errors, and a force that varies from segment to segment by a share, as that of an inexact law does."""
+    measure, _ = measured(seed, 0.0, 1.0)
+    (record,), length = measure.records, SAMPLES // count
+    random = np.random.default_rng([seed, 4])
+    share = np.repeat(varies * random.standard_normal(count), length)
+    samples = record.measured + (FORCE_N * measure.rows[0, : len(share)] * share)[:, None]
+    segments = tuple(Segment(k * length, (k + 1) * length, "multisine", 1.0, 0) for k in range(count))
+    record = replace(record, measured=samples, recording=replace(record.recording, segments=segments))
+    varied = replace(measure, records=(record,))
+    known = sensitivity(varied, TUNING, np.zeros(1), PUSHED)
+    found = fit(varied, TUNING, evaluate_fit(varied, TUNING, np.zeros(1), PUSHED), known, 4)
+    noise, between = standard_errors(varied, TUNING, found, known), segment_errors(varied, TUNING, found, known)
+    of, at = found.hypothesis.numbers[0], found.hypothesis.point[0]
+    return [
+        of.value(at - 1.96 * error) <= FORCE_N <= of.value(at + 1.96 * error)
+        for error in (noise[1], np.hypot(noise[1], between[1]))
+    ]
+
+
+@pytest.mark.parametrize(("varies", "noise_holds"), [(VARIES, (0.0, 0.75)), (0.0, (0.88, 1.0))])
+def test_segments_show_what_varies_between_them(varies, noise_holds):
+    held = np.mean([of_segments(seed, varies) for seed in range(DRAWS)], axis=0)
+    assert noise_holds[0] <= held[0] <= noise_holds[1]
+    assert held[1] >= 0.88
+
+
+def test_the_jackknife_is_that_of_fits_without_each_segment():
+    """The model is a straight line, so that one step is exact: each fit is repeated without a segment."""
+    measure, _ = measured(3, 0.0, 1.0)
+    (record,), length = measure.records, SAMPLES // SEGMENTS
+    segments = tuple(Segment(k * length, (k + 1) * length, "multisine", 1.0, 0) for k in range(SEGMENTS))
+    record = replace(record, recording=replace(record.recording, segments=segments))
+    measure = replace(measure, records=(record,))
+    known = sensitivity(measure, TUNING, np.zeros(1), PUSHED)
+    whole = fit(measure, TUNING, evaluate_fit(measure, TUNING, np.zeros(1), PUSHED), known, 8)
+    forces = []
+    for segment in segments:
+        kept = record.fit.copy()
+        kept[segment.start : segment.stop] = False
+        fewer = replace(measure, records=(replace(record, fit=kept),))
+        there = sensitivity(fewer, TUNING, np.zeros(1), PUSHED)
+        start = evaluate_fit(fewer, TUNING, whole.deviations, whole.hypothesis)
+        forces.append(fit(fewer, TUNING, start, there, 8).hypothesis.point[0])
+    expected = np.sqrt((SEGMENTS - 1) / SEGMENTS * np.sum((np.array(forces) - np.mean(forces)) ** 2))
+    assert segment_errors(measure, TUNING, whole, known)[1] == pytest.approx(expected, rel=0.02)
+
+
+def test_one_segment_has_no_jackknife():
+    measure, _ = measured(3, 0.0, 1.0)
+    known = sensitivity(measure, TUNING, np.zeros(1), PUSHED)
+    found = fit(measure, TUNING, evaluate_fit(measure, TUNING, np.zeros(1), PUSHED), known, 4)
+    assert segment_errors(measure, TUNING, found, known) is None
