@@ -75,6 +75,10 @@ def _drop_former(context: SearchContext, found: Explanation, time_left: TimeBudg
 
 
 def _drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
+    """Drop last effects that take little and leave more than noise; and a third one where two already fit as well as
+    laws of a real device do: none is exact, and a third takes up what they leave."""
+    while len(found.steps) > 2 and as_good_as_noise(two := without_effect(context, found, len(found.steps) - 1)):
+        found = two
     while len(found.steps) > 1 and not as_good_as_noise(found):
         if shares_taken(found.retuned, found.steps)[-1] >= LAST_EFFECT_SHARE:
             break

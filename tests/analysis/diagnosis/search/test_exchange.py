@@ -9,7 +9,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.revise_selection import exchange_effects
-from analysis.diagnosis.search.search import prune
+from analysis.diagnosis.search.search import _drop_negligible, prune
 from analysis.diagnosis.search.time_budget import CountedBudget, always
 from analysis.diagnosis.settings import SEARCH_ON
 from equalizer.effects.catalogue import EFFECTS
@@ -111,3 +111,16 @@ def test_rivals_are_kept_only_where_they_were_compared(limited_and_late):
     beside = found_of(limited_and_late, claim("viscous_damping", damping=0.5)).steps
     left = prune(limited_and_late, replace(three, rounds=((*three.rounds[0], *beside), *three.rounds[1:])), always)
     assert len(left.rounds[0]) == 1
+
+
+@pytest.mark.parametrize(("third", "kept"), [("viscous_damping", 2), ("force_saturation", 3)])
+def test_a_third_is_named_only_where_two_leave_more_than_laws_of_real_devices_do(limited_and_late, third, kept):
+    claims = {
+        "viscous_damping": claim("viscous_damping", damping=0.01),
+        "force_saturation": claim("force_saturation", limit=LIMIT_N),
+        "sensor_lag": claim("sensor_lag", bandwidth=LAG_HZ),
+    }
+    order = [each for name, each in claims.items() if name != third]
+    found = found_of(limited_and_late, *order, claims[third])
+    left = _drop_negligible(limited_and_late, found)
+    assert len(left.steps) == kept

@@ -77,7 +77,7 @@ def no_fit(monkeypatch):
     def refused(*_):
         raise AssertionError("fitted again")
 
-    monkeypatch.setattr("analysis.diagnosis.search.without_effect.refine", refused)
+    monkeypatch.setattr("analysis.diagnosis.search.revise_selection.refine", refused)
 
 
 def test_two_that_are_needed_are_compared_while_there_is_time(rubbing_and_pushed, no_fit):
