@@ -118,6 +118,7 @@ def test_a_board_that_falls_silent_leaves_the_ticks_without_a_value():
     assert (sensed.health.unplaced_ticks, sensed.health.missing) == (200, 1.0)
 
 
+@pytest.mark.may_be_late  # once 7 ms early with both cores full, in no run by itself
 def test_a_trial_on_the_driver_is_recorded_on_its_ticks_missed_ones_too(stub, rigs, tmp_path, monkeypatch):
     from study.devices.clock import RealClock
     from study.devices.opening import open_device
