@@ -13,7 +13,6 @@ from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
-from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.search.search import HUM, SearchResult, has_law, hums_low, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
@@ -73,10 +72,10 @@ def search_by_simulation(
             recordings, fitting.model, (context, catalogue, observable), settings, progress
         )
     else:
-        found = _search(context, catalogue, settings, progress, chosen.floors)
+        found = _search(context, catalogue, settings, progress)
         if hums_low(found.result.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
-            found = _search(context, catalogue, settings, progress, chosen.floors)
+            found = _search(context, catalogue, settings, progress)
     if balances and found.result.judgement.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
         found = replace(found, result=unname_doubtful_effects(require_enough_gain(found.result, repeats)))
@@ -114,21 +113,14 @@ def _search_with_learned_error(
 
 
 def _search(
-    context: SearchContext,
-    catalogue: Sequence[Effect],
-    settings: DiagnosisSettings,
-    progress: Progress,
-    floors: Sequence[NoiseFloor],
+    context: SearchContext, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
 ) -> SearchOutcome:
     def beyond(seen: SearchResult) -> SearchResult:
         # Low-frequency hum is not accepted as an answer: the search is repeated without it.
         if not settings.discovery or settings.fitted or hums_low(seen.found):
             return seen
         from analysis.diagnosis.discovery.add_laws import add_laws
-        from analysis.diagnosis.search.impacts import is_irregular
 
-        if any(floor.how == "repeats" for floor in floors) and is_irregular(seen.context, seen.found, floors):
-            return seen  # No law predicts a motion that differs from period to period: that is left to play.
         return add_laws(seen, progress, settings.time_left)
 
     return SearchOutcome(search_effects(context, catalogue, progress, settings.time_left, beyond), CleanFloor())
