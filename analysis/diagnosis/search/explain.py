@@ -156,22 +156,24 @@ def explain(
     begun: Sequence[Sequence[FittedCandidate]] = (),
 ) -> Explanation:
     """Re-tunes the model and adds effects one by one. time_left: asked before each piece of the search; what was found
-    when it says no is kept. begun: per step of a search on fewer samples, it and its rivals: where this one begins."""
+    when it says no is kept. begun: per step of a search on fewer samples, it and its rivals; one effect is added to
+    these."""
     before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
-    retuned = _retune(context, before)
+    retuned = refine(context, before)
     base = context.candidate(retuned)
     confirmed = context.with_test_score(base)
     surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     rounds = _known_rounds(context, base, begun)
     steps = [each[0] for each in rounds]
     base = steps[-1] if steps else base
+    most = len(rounds) + 1 if begun else MOST_EFFECTS
     barred, ended_early = "", False
     within_time = replace(context, map_=limit_map(context.map_, time_left))
     more = SEARCH_ON * (1.0 if context.references is None else context.references.beyond)
     while (
         not context.certain
-        and len(rounds) < MOST_EFFECTS
+        and len(rounds) < most
         and (base.score.worst_channel > (more if rounds else NOISE_ALONE) or (surprised and not rounds))
     ):
         step = Step(f"looking for the {_ORDINALS[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
@@ -222,11 +224,7 @@ def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypo
 
 def retune_alone(context: SearchContext) -> Fitted:
     """The model re-tuned, without any added effect."""
-    return _retune(context, evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
-
-
-def _retune(context: SearchContext, before: Fitted) -> Fitted:
-    return refine(context, before)
+    return refine(context, evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
 
 
 @dataclass(frozen=True, slots=True)

@@ -184,9 +184,6 @@ def _find_with_opened(
     going_on = left is first.found.after and as_good_as_noise(first.found)
     begun = first.found.rounds[: len(first.found.steps)] if going_on else ()
     found = _explain_and_prune(context, catalogue, progress, time_left, begun)
-    if begun and not as_good_as_noise(found) and time_left():
-        anew = _explain_and_prune(context, catalogue, progress, time_left)
-        found = min(found, anew, key=lambda each: (not as_good_as_noise(each), each.after.score.mean_log_error))
     used = TEST_HALF_USED if milder is None else MILDER_TEST_USED
     return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
 
