@@ -17,7 +17,7 @@ from equalizer.effects.discovered_law import law_channels, law_effect, law_value
 from equalizer.laws.law import Law
 from equalizer.laws.roles import roles
 
-_CUBE_WITH_MEMORY = re.compile(r"\b(\w+)\*lag\(\1\*\*2, p(\d+)\)")
+_CUBE_WITH_MEMORY = re.compile(r"\b(\w+)\*lag\(\1\*\*2, (?:p(\d+)|0)\)")
 _LIMIT = re.compile(r"(\w+) \+ p0\*\((.+) - \1\)")
 """A signal plus a share of a soft limit of it less itself (`grammar.bent_terms`)."""
 
@@ -64,11 +64,11 @@ def _single_claim(whole: Hypothesis, number: int) -> Hypothesis:
 def _without_short_memory(law: Law, sample_s: float) -> Law:
     """The law with the cube of a signal for the signal times its lagged square where the lag is less than a sample."""
     found = _CUBE_WITH_MEMORY.search(law.expression)
-    if found is None or law.numbers[int(found[2])] >= sample_s:
+    if found is None or found[2] is None or law.numbers[int(found[2])] >= sample_s:
         return law
     # The number is written in and the place that held it with it, so that those after it move up.
     short = substitute_number(law, int(found[2]), 0.0)
-    return replace(short, expression=re.sub(r"\b(\w+)\*lag\(\1\*\*2, 0\)", r"\1**3", short.expression))
+    return replace(short, expression=_CUBE_WITH_MEMORY.sub(r"\1**3", short.expression, count=1))
 
 
 def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:

@@ -116,7 +116,10 @@ def test_a_law_whose_rivals_were_not_fitted_is_a_candidate(hardened):
 
 def test_a_search_whose_time_ends_within_a_fit_keeps_what_it_has(hardened):
     context, known = hardened
-    whole = discover(context, known, quiet, always)
-    asked = CountedBudget(30)
-    begun = discover(context, known, quiet, asked)
-    assert begun is None or begun.found.after.fitted.cost >= whole.found.after.fitted.cost * (1 - 1e-6)
+    kept = [discover(context, known, quiet, CountedBudget(questions)) for questions in (1, 30, 100, 160, 100_000)]
+    assert kept[0] is None
+    assert all(each.complete for each in kept[-1].rounds)
+    cut = [found for found in kept[1:-1] if found is not None]
+    assert cut
+    assert any(not each.rounds[-1].complete for each in cut)
+    assert all(each.found.after.fitted.cost < known.retuned.fitted.cost for each in cut)

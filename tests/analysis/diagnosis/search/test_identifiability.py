@@ -9,10 +9,15 @@ from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_c
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retune_alone
-from analysis.diagnosis.search.identifiability import distance_from_none, final_errors, keep_identifiable
+from analysis.diagnosis.search.identifiability import (
+    distance_from_none,
+    final_errors,
+    interval_errors,
+    keep_identifiable,
+)
 from analysis.diagnosis.search.search import search_effects
 from analysis.diagnosis.search.time_budget import always
-from analysis.diagnosis.settings import INTERVAL_FACTOR
+from analysis.diagnosis.settings import INTERVAL_FACTOR, MOST_BETWEEN_SEGMENTS
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -143,3 +148,23 @@ def test_numbers_whose_intervals_all_hold_none_are_not_named(rubbing, monkeypatc
         lambda context, found: found.errors[1] if found.errors else wide,
     )
     assert keep_identifiable(rubbing, found, always).undetermined == ("asymmetric_friction",)
+
+
+def test_stated_intervals_hold_the_noise_and_a_bounded_part_of_what_varies_between_segments(rubbing):
+    found = fitted(rubbing, FRICTION)
+    noise = final_errors(rubbing, found)
+    stated = interval_errors(rubbing, found, noise)
+    assert (stated >= noise).all()
+    assert (stated <= np.hypot(1.0, MOST_BETWEEN_SEGMENTS) * noise * (1 + 1e-9)).all()
+    assert stated[-1] > noise[-1] > 0
+
+
+def test_one_segment_tells_nothing_between_segments(rubbing):
+    def joined(measure):
+        records = (replace(each, recording=replace(each.recording, segments=())) for each in measure.records)
+        return measure.with_records(tuple(records))
+
+    alone = replace(rubbing, measure=joined(rubbing.measure), whole=joined(rubbing.whole))
+    found = fitted(rubbing, FRICTION)
+    noise = final_errors(alone, found)
+    assert interval_errors(alone, found, noise) == pytest.approx(INTERVAL_FACTOR * noise)
