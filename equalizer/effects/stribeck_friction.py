@@ -20,9 +20,12 @@ _MORE = 1.2
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Solve for the friction at the step's mean velocity, which itself depends on the force."""
-    mean, force, start = at[V], 0.0, memory[0]
+    mean, force, start, last = at[V], 0.0, memory[0], -1.0
     for _ in range(3):
         level = numbers[0] + (numbers[1] - numbers[0]) * np.exp(-((mean / numbers[2]) ** 2))
+        if abs(level - last) <= 1e-6 * level:
+            break
+        last = level
         force = friction_force(level, level, start, memory, at)
         mean = 0.5 * (at[V] + at[V_FREE] + at[V_PER_N] * force)
     return float(force)

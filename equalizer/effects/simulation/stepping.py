@@ -17,8 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from equalizer.effects.simulation.instant import LENGTH, SEEN
 from equalizer.effects.simulation.linear_step_kernel import advance_unforced
-from equalizer.effects.simulation.mechanism_kernel import PORT_ROWS, Integers, step_mechanism
+from equalizer.effects.simulation.mechanism_kernel import OWN_ROWS, PORT_ROWS, Integers, step_mechanism
 from equalizer.effects.simulation.modal_form import step_form
 from equalizer.plant.linear_simulation import LinearSteps
 from equalizer.signals.signal import FloatArray
@@ -96,15 +97,20 @@ def forced_stepping(linear: LinearSteps, forces: Forces, steps: int, stride: int
     commands = np.ascontiguousarray(commanded, dtype=np.float64) if forces.sees else np.empty((0, 0))
     state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(where))), forces.memory.copy()
 
+    own = np.zeros((OWN_ROWS, len(forces.places)))
+    at = np.zeros(LENGTH + SEEN * len(where) if forces.sees else LENGTH)
+    scratch = np.zeros(len(state) + len(where)), at, own, np.zeros_like(memory)
+
     def run(rows: FloatArray, first: int) -> None:
         step_mechanism(
             forces.laws, forces.places, forces.numbers, memory, step, rows,
             commands[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
-            linear.step_s,
+            linear.step_s, *scratch,
         )  # fmt: skip
 
     def begin(from_: FloatArray) -> None:
         state[:] = form.inward @ from_
+        own[:] = 0.0
         ports[:2] = (output[: 2 * len(where)] @ from_).reshape(2, -1)
 
     return Stepping(stride, into, form.outward, BLOCK_UNDER_FORCES, run, begin)
