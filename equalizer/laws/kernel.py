@@ -17,8 +17,8 @@ SETTLED, BEGUN, FROM_ZERO = 0.0, 1.0, 2.0
 """First number of the memory: empty, to be started in the steady state of the signals' first values; started; empty, to
 be started with all signals zero."""
 _BORROWED: Any = {"_nrt": False}
-"""Compiles without reference counts of arrays, which all belong to the caller: they took two thirds of the time of a short law.
-Such a function allocates nothing."""
+"""Compiles without reference counts of arrays, which all belong to the caller: they took two thirds of the time of a
+short law. Such a function allocates nothing."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 _NUMBER, _VARIABLE = CODE["number"], CODE["variable"]

@@ -5,12 +5,21 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
 from analysis.diagnosis.errors.evidence_from_residuals import evidence_of
 from equalizer.effects.effect import AxisForce, Effect, JointForce, PlacedEffect
-from equalizer.effects.simulation.simulator import Measurement, SimulationResult, simulate_mechanism, simulate_response
+from equalizer.effects.simulation.bodies import Restarts
+from equalizer.effects.simulation.simulator import (
+    Measurement,
+    SimulationResult,
+    simulate_mechanism,
+    simulate_pieces,
+    simulate_response,
+    states_before,
+)
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -30,6 +39,8 @@ class FreeSimulation:
     least: float = 0.0
     coarser: int = 1
     """Factor on the length of steps under motion-dependent forces."""
+    pieces: tuple[Restarts, ...] = ()
+    """Per record, where its parts were joined, and the states in which these begin; empty where records are whole."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         return replace(self, records=records)
@@ -47,10 +58,19 @@ class FreeSimulation:
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
         with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
             return tuple(
-                _subtract_prediction(record.measured, self._simulate(model, effects, record, simulate_response))
+                _subtract_prediction(record.measured, self._simulate(model, effects, record, simulate_response, joined))
                 / self.unit
-                for record in self.records
+                for record, joined in zip(self.records, self.pieces or (None,) * len(self.records), strict=True)
             )
+
+    def states_before(
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, at: npt.NDArray[np.int64]
+    ) -> FloatArray:
+        """States of the simulation just before given samples of a record: positions and velocities (k, 2n)."""
+        signals = record.recording
+        every = under_conditions((*self.known, *effects), signals)
+        model = add_carried_weight(model, signals)
+        return states_before(model, record.command, (signals.sample_rate_hz, signals.hold), every, at)
 
     def _simulate(
         self,
@@ -58,12 +78,16 @@ class FreeSimulation:
         effects: Sequence[PlacedEffect],
         record: Observed,
         simulate: Callable[..., SimulationResult],
+        joined: Restarts | None = None,
     ) -> SimulationResult:
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         model = add_carried_weight(model, signals)
         every = [_coarsen(placed, self.coarser) for placed in under_conditions((*self.known, *effects), signals)]
+        if joined is not None:
+            sampled = signals.sample_rate_hz, signals.hold
+            return simulate_pieces(model, record.command, sampled, every, measurement, joined)
         return simulate(model, record.command, signals.sample_rate_hz, every, signals.hold, measurement)
 
     def evidence(

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from equalizer.effects.effect import Effect, Parameter, PlacedEffect, Values
+from equalizer.effects.effect import AxisForce, Effect, JointForce, Parameter, PlacedEffect, Values
 from equalizer.signals.signal import FloatArray
 
 Spread = Literal["one", "all", "each"]
@@ -100,6 +100,11 @@ class Hypothesis:
         """The placed effects of one claim."""
         first = sum(claim.groups for claim in self.claims[:number])
         return self.placed_effects()[first : first + self.claims[number].groups]
+
+
+def has_motion_forces(hypothesis: Hypothesis) -> bool:
+    """Whether a force that depends on the motion is part of it."""
+    return any(isinstance(claim.effect.acts, (AxisForce, JointForce)) for claim in hypothesis.claims)
 
 
 def without_claim(whole: Hypothesis, number: int) -> Hypothesis:

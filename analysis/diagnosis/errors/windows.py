@@ -99,7 +99,7 @@ class Windows:
             (recording.sample_rate_hz, recording.hold),
             under_conditions(effects, recording),
             Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
-            Restarts(length, states),
+            Restarts(length * np.arange(len(states)), states),
         )
         with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
             left = (record.measured - predicted_channels(played, record.measured.shape[1])) / self.unit

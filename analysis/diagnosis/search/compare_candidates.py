@@ -4,14 +4,17 @@ A Gauss-Newton fit converges about geometrically: after gains g1 and g2 of two s
 g2 min(g2 / g1, 1). A fit ends when that is below a tolerance (`output_error.expected_gain`). The sensitivity to the
 model's own parameters costs one simulation each; it is kept from fit to fit, and recomputed only where a parameter has
 moved far from where it was computed. So all candidates can be compared at a small part of the cost of full fits, and
-only those within reach of the best are refined.
+only those within reach of the best are refined. Under forces that depend on the motion, a sensitivity without these, or
+of one period, ends short of the minimum: what is refined is polished with that of all numbers on all samples.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import similar_hypotheses
+from analysis.diagnosis.errors.hypothesis import has_motion_forces, similar_hypotheses
 from analysis.diagnosis.errors.output_error import (
     Fitted,
     Sensitivity,
@@ -19,9 +22,11 @@ from analysis.diagnosis.errors.output_error import (
     expected_gain,
     fit,
     residuals_to_fit,
+    sensitivity,
 )
 from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, sensitivity_at
-from analysis.diagnosis.search.short_recordings import short_recordings_of
+from analysis.diagnosis.search.short_recordings import coarsen, short_recordings_of
+from analysis.diagnosis.search.time_budget import OutOfTimeError
 from analysis.diagnosis.settings import (
     MOST_REFINED,
     NO_SECOND_START,
@@ -33,6 +38,9 @@ from analysis.diagnosis.settings import (
 )
 
 SECOND_ROUNDS, WHOLE_ROUNDS = 4, 2
+MOST_POLISHED, POLISHED = 2, 0.05
+"""Times at most that fits are polished, and share of the cost that must be gained to go on; each takes a simulation for
+every number of the model. By hand."""
 MOST_REFRESHED, CONVERGED, CONVERGED_FAR, STALE = 4, 0.0005, 0.01, 0.5
 """The sensitivity to the model's numbers is recomputed so often, or until that gains no more than such a share, or, far
 above the noise, such a share of the logarithm of the error; and only where one of the numbers has moved by so many
@@ -42,16 +50,17 @@ standard deviations since, for it costs a simulation for each."""
 def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitted]) -> tuple[FittedCandidate, ...]:
     """The candidates sorted by error, the best fits refined. fits: first fits, the best first (`first_fits`)."""
     worth = _worth_refining(base, fits)
-
-    def refit_first(law: Fitted) -> tuple[Fitted, Sensitivity]:
-        return refine_with_sensitivity(context, law)
-
-    first: list[tuple[Fitted, Sensitivity]] = list(
-        context.guard.over(map, FITTING)(refit_first, worth[:1])  # type: ignore[arg-type]
-    )
-    refined = [law for law, _ in first]
+    # First fits beside a force that depends on the motion have been continued on all samples already.
+    continued = has_motion_forces(base.hypothesis)
+    first: list[tuple[Fitted, Sensitivity]] = []
+    if not continued:
+        refine_first = partial(refine_with_sensitivity, context)
+        first = list(context.guard.over(map, FITTING)(refine_first, worth[:1]))  # type: ignore[arg-type]
+    refined = worth[:1] if continued else [law for law, _ in first]
 
     def refit(law: Fitted) -> Fitted:
+        if continued:
+            return law
         near = first and _is_timeless(law) == _is_timeless(refined[0])
         near = near and _prediction_difference(context, law, refined[0]) < SHARED_MOTION * (base.cost - refined[0].cost)
         return refine_with_sensitivity(context, law, first[0][1] if near else None)[0]
@@ -66,8 +75,40 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
     rest = [law for law in fits[1 if worth else 0 :] if not any(law is other for other in others)]
     plain = [plain_law for plain_law in rest if any(_contains(richer, plain_law) for richer in refined[:1])][:1]
     refined += context.guard.over(context.map_, FITTING)(refit, [*others, *plain])  # type: ignore[arg-type]
+    refined = _polish(context, sorted(refined, key=lambda law: context.candidate(law).score.mean_log_error))
     fitted_candidates = [context.candidate(law) for law in [*refined, *(law for law in rest if law not in plain)]]
     return tuple(sorted(fitted_candidates, key=lambda candidate: candidate.score.mean_log_error))
+
+
+def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
+    """The fits continued with the sensitivity of all numbers under the forces of the first, which they share, and again
+    while that gains and more than noise is left. fits: of laws that do nearly the same, the best first; where that
+    leaves noise alone, those that leave much more are given up. Without such forces they are complete."""
+    measure, tuning = context.measure, context.tuning
+    if not fits or not has_motion_forces(fits[0].hypothesis):
+        return fits
+    if _left(context, fits[0]) <= NO_SECOND_START and any(_left(context, law) > REACHES_NOISE for law in fits):
+        near = [law for law in fits if _left(context, law) <= REACHES_NOISE]
+        return sorted([*_polish(context, near), *(law for law in fits if law not in near)], key=lambda law: law.cost)
+    for _ in range(MOST_POLISHED):
+        try:
+            known = sensitivity(measure, tuning, fits[0].deviations, fits[0].hypothesis, context.map_)
+
+            def continue_fit(law: Fitted, known: Sensitivity = known) -> Fitted:
+                return fit(measure, tuning, law, known, WHOLE_ROUNDS, context.map_)
+
+            further: list[Fitted] = list(context.guard.over(context.map_, FITTING)(continue_fit, fits))  # type: ignore[arg-type]
+        except OutOfTimeError:
+            break  # fits that are not polished are results all the same
+        gained, fits = bool(further) and further[0].cost < fits[0].cost * (1 - POLISHED), further
+        if not gained or _left(context, fits[0]) <= NO_SECOND_START:
+            break
+    return fits
+
+
+def _left(context: SearchContext, law: Fitted) -> float:
+    """Error of the worst channel, times the noise."""
+    return context.candidate(law).score.worst_channel
 
 
 def _is_timeless(law: Fitted) -> bool:
@@ -97,28 +138,29 @@ def _worth_refining(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
 
 def refine(context: SearchContext, fitted: Fitted) -> Fitted:
     """The fit continued until it converges."""
-    return refine_with_sensitivity(context, fitted)[0]
+    return _polish(context, [refine_with_sensitivity(context, fitted)[0]])[0]
 
 
 def refine_with_sensitivity(
     context: SearchContext, fitted: Fitted, known: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
     """The refined fit and its sensitivity. Where a drive repeats, it is first fitted to one period of each segment,
-    whose sensitivity then stands for all periods. known: the sensitivity of a law that moves the device nearly
+    whose sensitivity then stands for all periods; where it does not, under forces that depend on the motion, with
+    longer steps. known: the sensitivity of a law that moves the device nearly
     alike."""
     short_form = short_recordings_of(context, fitted)
-    if short_form is None:
+    near_context = replace(context, measure=coarsen(context.measure)) if short_form is None else short_form.context
+    if short_form is None and not has_motion_forces(fitted.hypothesis):
         return _refine_from_both_starts(context, fitted, known)
-    short = short_form.context
     near, known = _refine_from_both_starts(
-        short, evaluate_fit(short.measure, short.tuning, fitted.deviations, fitted.hypothesis), known
+        near_context, evaluate_fit(near_context.measure, context.tuning, fitted.deviations, fitted.hypothesis), known
     )
     start = evaluate_fit(context.measure, context.tuning, near.deviations, near.hypothesis)
-    found = _fit_whole(context, start, short_form.repeat_sensitivity(known))
+    found = _fit_whole(context, start, known if short_form is None else short_form.repeat_sensitivity(known))
     # What one period leaves open may run away on the whole.
-    return (
-        _choose_plainest(context, found) if found.cost <= fitted.cost else _refine_from_both_starts(context, fitted)[0]
-    ), known
+    if found.cost <= fitted.cost:
+        return _choose_plainest(context, found), known
+    return (fitted if has_motion_forces(fitted.hypothesis) else _refine_from_both_starts(context, fitted)[0]), known
 
 
 def _fit_whole(context: SearchContext, start: Fitted, known: Sensitivity) -> Fitted:

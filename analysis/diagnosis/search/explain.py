@@ -31,9 +31,8 @@ from analysis.diagnosis.search.compare_candidates import compare_candidates, ref
 from analysis.diagnosis.search.no_prediction import predicts_nothing
 from analysis.diagnosis.search.parsimony import excludes, plainest_first
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
-from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
+from analysis.diagnosis.search.screening import screen
 from analysis.diagnosis.search.search_context import (
-    FITTING,
     SCREENING,
     STARTING,
     FittedCandidate,
@@ -41,7 +40,7 @@ from analysis.diagnosis.search.search_context import (
     first_fits,
     sensitivity_at,
 )
-from analysis.diagnosis.search.short_recordings import ShortRecordings, coarsen, short_recordings_of
+from analysis.diagnosis.search.short_recordings import fits_on_short_recordings, short_recordings_of
 from analysis.diagnosis.search.starting_hypotheses import CLOCK_DRIFT, candidates, clock_drift_by_trial, within_data
 from analysis.diagnosis.search.time_budget import OutOfTimeError, always, limit_map
 from analysis.diagnosis.settings import (
@@ -51,7 +50,6 @@ from analysis.diagnosis.settings import (
     MOST_EFFECTS,
     NOISE_ALONE,
     SEARCH_ON,
-    WORTH_FITTING,
 )
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
@@ -60,47 +58,6 @@ from equalizer.signals.signal import FloatArray
 
 MOST_REFITTED_RIVALS = 3
 """Rivals of a step that are fitted again where a search goes on with more samples; each takes a second or more."""
-
-
-def fits_on_short_recordings(
-    context: SearchContext,
-    short_form: ShortRecordings,
-    base: Fitted,
-    timeless: Sequence[Hypothesis],
-    timed: Sequence[Hypothesis],
-) -> list[Fitted]:
-    """First fits on all samples, the best first, screened on short recordings. timed: hypotheses that depend on
-    sampling times, which short recordings cannot judge."""
-    short, guard = replace(short_form.context, measure=coarsen(short_form.context.measure)), context.guard
-    there = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
-    known = sensitivity_at(short, base.deviations, base.hypothesis, with_forces=True)
-    screened = screen(short.measure, short.tuning, there, known, timeless, guard.over(short.map_, SCREENING))
-
-    def whole(fitted: Fitted) -> Fitted:
-        return evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
-
-    each = guard.over(context.map_, FITTING)
-    fits: list[Fitted] = list(each(whole, first_fits(short, there, known, screened)))  # type: ignore[arg-type]
-    if timed:
-        # What the model's own numbers do repeats all the same.
-        repeats = short_form.repeat_sensitivity(known)
-        coarse = coarsen(context.measure)
-        begun = evaluate_fit(coarse, context.tuning, base.deviations, base.hypothesis)
-        screened = screen(coarse, context.tuning, begun, repeats, timed, guard.over(context.map_, SCREENING))
-        fits += first_fits(context, base, repeats, _keep_promising((base, begun), fits, screened))
-    # A law that the short recordings leave open may run away on the whole.
-    return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda found: found.cost)
-
-
-def _keep_promising(
-    bases: tuple[Fitted, Fitted], fits: Sequence[Fitted], screened: Sequence[ScreenedHypothesis]
-) -> list[ScreenedHypothesis]:
-    """The screened hypotheses whose predicted gain is enough beside the best gain so far, with costs beside the base.
-    bases: as simulated for fits, and as for the screening, where steps are longer."""
-    base, begun = bases
-    best = max((base.cost - law.cost for law in fits), default=0.0)
-    told = [replace(law, cost=base.cost - (begun.cost - law.cost)) for law in screened]
-    return [law for law in told if base.cost - law.cost >= max(WORTH_FITTING * best, 0.0)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

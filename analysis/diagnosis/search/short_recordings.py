@@ -15,15 +15,25 @@ from analysis.diagnosis.data.growth_rate import growth_rate
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, residuals_to_fit
+from analysis.diagnosis.errors.hypothesis import Hypothesis, has_motion_forces
+from analysis.diagnosis.errors.output_error import (
+    Fitted,
+    Sensitivity,
+    evaluate_fit,
+    fit,
+    residuals_to_fit,
+    sensitivity,
+)
 from analysis.diagnosis.forces.inverse_dynamics import band_motion
 from analysis.diagnosis.forces.inverse_lines import zeros_of
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.periods import settled_periods
-from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.settings import RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE
+from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
+from analysis.diagnosis.search.search_context import FITTING, SCREENING, SearchContext, first_fits, sensitivity_at
+from analysis.diagnosis.settings import RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE, WORTH_FITTING
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import AxisForce, JointForce
+from equalizer.effects.simulation.bodies import Restarts
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -105,8 +115,9 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
     """The shortened recordings; None where little would be saved, where held effects depend on sampling times, and
     where the first record, of which evidence is taken, has nothing to fit. held: fitted on the whole.
 
-    A force with a memory (dry friction, play) may remember what was cut out for longer than the linear model rings: the
-    run-in is doubled until the shortened recordings show the errors of the whole.
+    A force with a memory (dry friction, play) may remember what was cut out for longer than the linear model rings:
+    each piece begins in the state that the whole simulation has there, and the run-in is doubled until the shortened
+    recordings show the errors of the whole.
     """
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
@@ -118,6 +129,8 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
     before_s, behind_s = _run_in_s(measure, context.tuning.model)
     periods, kept = [_last_periods(record) for record in measure.records], -1
     while (short := _shorten(context, measure, periods, (before_s, behind_s))) is not None:
+        if remembers and isinstance(measure, FreeSimulation):
+            short = _continue_from(short, measure, held)
         if not remembers or short.agrees(held):
             return short
         # A simulation that ran away agrees with none, and all that lies before what is fitted may be kept already.
@@ -145,6 +158,18 @@ def _shorten(
     return ShortRecordings(
         replace(context, measure=short), kept, _replacements(measure, cut), np.flatnonzero(fitted), measure
     )
+
+
+def _continue_from(short: ShortRecordings, measure: FreeSimulation, held: Fitted) -> ShortRecordings:
+    """The shortened recordings, each piece begun in the state that the whole simulation of a fit has there."""
+    records = [record for record in measure.records if record.fit.any()]
+    model, effects = short.context.tuning.tune(held.deviations), held.hypothesis.placed_effects()
+    pieces = []
+    for record, kept in zip(records, short.kept, strict=True):
+        begun = np.flatnonzero(np.diff(kept, prepend=-2) > 1)
+        pieces.append(Restarts(begun, measure.states_before(model, effects, record, kept[begun])))
+    joined = replace(short.context.measure, pieces=tuple(pieces))  # type: ignore[type-var]
+    return replace(short, context=replace(short.context, measure=joined))
 
 
 def _replacements(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
@@ -211,3 +236,48 @@ def _cut_in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedFor
 def _piece(record: Observed, kept: Places, fit: Mask) -> Observed:
     sealed = np.zeros(len(kept), dtype=np.bool_)
     return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], sealed)
+
+
+def fits_on_short_recordings(
+    context: SearchContext,
+    short_form: ShortRecordings,
+    base: Fitted,
+    timeless: Sequence[Hypothesis],
+    timed: Sequence[Hypothesis],
+) -> list[Fitted]:
+    """First fits on all samples, the best first, screened on short recordings. timed: hypotheses that depend on
+    sampling times, which short recordings cannot judge: they are fitted where the share that they promise of the cost
+    is not far below that of the others."""
+    short, guard = replace(short_form.context, measure=coarsen(short_form.context.measure)), context.guard
+    begun = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
+    known = sensitivity_at(short, base.deviations, base.hypothesis, with_forces=True)
+    screened = screen(short.measure, short.tuning, begun, known, timeless, guard.over(short.map_, SCREENING))
+    of_all, forced = short_form.repeat_sensitivity(known), has_motion_forces(base.hypothesis)
+    if forced:
+        of_all = sensitivity(context.measure, context.tuning, base.deviations, base.hypothesis, context.map_)
+
+    def whole(fitted: Fitted) -> Fitted:
+        there = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
+        # What a period does not show of slow motion under friction would be counted against the law.
+        return fit(context.measure, context.tuning, there, of_all, 1) if forced else there
+
+    each, found = guard.over(context.map_, FITTING), first_fits(short, begun, known, screened)
+    fits: list[Fitted] = list(each(whole, found))  # type: ignore[arg-type]
+    if timed:
+        coarse = replace(context, measure=coarsen(context.measure))
+        from_ = evaluate_fit(coarse.measure, context.tuning, base.deviations, base.hypothesis)
+        screened = screen(coarse.measure, context.tuning, from_, of_all, timed, guard.over(context.map_, SCREENING))
+        promising = _keep_promising((begun, found), from_, screened)
+        fits += each(whole, first_fits(coarse, from_, of_all, promising))  # type: ignore[arg-type]
+    # A law that the short recordings leave open may run away on the whole.
+    return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda law: law.cost)
+
+
+def _keep_promising(
+    others: tuple[Fitted, Sequence[Fitted]], from_: Fitted, screened: Sequence[ScreenedHypothesis]
+) -> list[ScreenedHypothesis]:
+    """The hypotheses that promise a share of the cost of `from_` which is not far below the best share of others; a
+    share, because others are judged on other samples and in other steps. others: their base, and fits."""
+    base, fits = others
+    best = max((1 - law.cost / base.cost for law in fits), default=0.0)
+    return [law for law in screened if 1 - law.cost / from_.cost >= max(WORTH_FITTING * best, 0.0)]

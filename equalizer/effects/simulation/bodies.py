@@ -5,11 +5,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
 from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.mechanism_kernel import LAWS, law_address, no_force
-from equalizer.effects.simulation.stepping import Forces, forced_stepping, unforced_stepping
+from equalizer.effects.simulation.stepping import Forces, Stepping, forced_stepping, unforced_stepping
 from equalizer.plant.linear_simulation import LinearSteps, driven_axes, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -70,12 +71,12 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Restarts:
-    """Restarts of a simulation from given states at regular intervals (multiple shooting)."""
+    """Restarts of a simulation from given states (multiple shooting)."""
 
-    every: int
-    """Samples between restarts, from the first sample on."""
+    at: npt.NDArray[np.int64]
+    """(k,): samples, rising; before the first of them, the simulation starts at rest."""
     states: FloatArray
-    """(windows, 2n), of the model without effects: positions, then velocities."""
+    """(k, 2n), of the model without effects: positions, then velocities."""
 
 
 def simulate_bodies(
@@ -85,15 +86,8 @@ def simulate_bodies(
     """Simulate the bodies, from rest where there are no restarts. Returns (n, 3 r + 2 p): the ports' positions,
     velocities and accelerations, the response and its rows' positions; and (n, r), the forces. Without the motion
     (n, 2 p) and (n, 0). driven: n or n steps; size: n and steps."""
-    linear = linear_steps(bodies.structure, step_s, bodies.ports)
-    ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.sees else 0)}))
-    steps, stride = size[1], len(driven.mean) // size[0]
-    commanded = driven.mean if driven.commanded is None else driven.commanded
-    stepping = (
-        forced_stepping(linear, kernel_forces(bodies, ports), steps, stride, commanded)
-        if ports
-        else unforced_stepping(linear, steps, stride)
-    )
+    linear, stepping, ports = _prepare_steps(bodies, driven, size, step_s)
+    stride = len(driven.mean) // size[0]
     output = _output_matrix(linear, stepping.outward, ports, motion)
     motion_rows, added = (
         np.empty((size[0], output.shape[1])),
@@ -105,8 +99,9 @@ def simulate_bodies(
     # A fit may try an unstable model.
     with np.errstate(over="ignore", invalid="ignore"):
         for first, end in _blocks(size[0], stepping.block, restarts):
-            if restarts is not None and first % restarts.every == 0:
-                stepping.begin(extend_state(bodies.structure, restarts.states[first // restarts.every]))
+            if restarts is not None and first in restarts.at:
+                state = restarts.states[np.searchsorted(restarts.at, first)]
+                stepping.begin(extend_state(bodies.structure, state))
             rows_of_block = spare[: (end - first) * rows]
             np.matmul(drive[first * rows : end * rows], stepping.into, out=rows_of_block[:, :inner])
             stepping.run(rows_of_block, first)
@@ -119,8 +114,38 @@ def simulate_bodies(
     return motion_rows, added
 
 
+def simulate_states(
+    bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float, at: npt.NDArray[np.int64]
+) -> FloatArray:
+    """States just before given samples: positions and velocities of the structure's coordinates (k, 2n), simulated from
+    rest. The other arguments: as for `simulate_bodies`."""
+    _, stepping, _ = _prepare_steps(bodies, driven, size, step_s)
+    states, rows = np.zeros((len(at), len(stepping.outward))), stepping.rows
+    drive = driven.mean.reshape(size[0] * rows, -1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for first, end in _blocks(size[0], stepping.block, None):
+            rows_of_block = np.ascontiguousarray(drive[first * rows : end * rows] @ stepping.into)
+            stepping.run(rows_of_block, first)
+            here = (at >= first) & (at < end)
+            states[here] = rows_of_block[(at[here] - first) * rows, : len(stepping.outward)] @ stepping.outward.T
+    return states
+
+
+def _prepare_steps(
+    bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float
+) -> tuple[LinearSteps, Stepping, tuple[int, ...]]:
+    """The linear steps, their stepping, and the ports at which forces act."""
+    linear = linear_steps(bodies.structure, step_s, bodies.ports)
+    ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.sees else 0)}))
+    steps, stride = size[1], len(driven.mean) // size[0]
+    if not ports:
+        return linear, unforced_stepping(linear, steps, stride), ports
+    commanded = driven.mean if driven.commanded is None else driven.commanded
+    return linear, forced_stepping(linear, kernel_forces(bodies, ports), steps, stride, commanded), ports
+
+
 def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:
-    edges = range(0, n, restarts.every) if restarts is not None else (0,)
+    edges = sorted({0, *restarts.at[restarts.at < n].tolist()}) if restarts is not None else [0]
     for begin, stop in zip(edges, (*edges[1:], n), strict=True):
         for first in range(begin, stop, longest):
             yield first, min(first + longest, stop)

@@ -4,10 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from equalizer.effects.effect import STEPS, OnResponse, PlacedEffect
-from equalizer.effects.simulation.bodies import Restarts, bodies_of, simulate_bodies
-from equalizer.effects.simulation.command_path import drive_actuators, moves_between_samples, subdivide_commands
+from equalizer.effects.simulation.bodies import Bodies, Restarts, bodies_of, simulate_bodies, simulate_states
+from equalizer.effects.simulation.command_path import (
+    ActuatorForce,
+    drive_actuators,
+    moves_between_samples,
+    subdivide_commands,
+)
 from equalizer.effects.simulation.sensor_path import clip_to_range, low_pass
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
@@ -91,6 +97,49 @@ def simulate_windows(
     )
 
 
+def simulate_pieces(
+    model: MechanicalModel,
+    commands: FloatArray,
+    sampled: tuple[float, Hold],
+    effects: Sequence[PlacedEffect],
+    measurement: Measurement | None,
+    restarts: Restarts,
+) -> SimulationResult:
+    """Simulate pieces of a recording that are joined end to end: with `simulate_response`, restarted from given
+    states."""
+    played = _simulate_motion(model, commands, sampled, effects, axes=False, restarts=restarts)
+    return _apply_sensor(model, played, sampled[0], effects, measurement)
+
+
+def states_before(
+    model: MechanicalModel,
+    commands: FloatArray,
+    sampled: tuple[float, Hold],
+    effects: Sequence[PlacedEffect],
+    at: npt.NDArray[np.int64],
+) -> FloatArray:
+    """States of the model's own coordinates just before given samples: positions, then velocities (k, 2n)."""
+    bodies, driven, steps = _drive_bodies(model, commands, sampled, effects)
+    states = simulate_states(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), at)
+    n, known = bodies.structure.coordinates, model.coordinates
+    return np.hstack([states[:, :known], states[:, n : n + known]])
+
+
+def _drive_bodies(
+    model: MechanicalModel, commands: FloatArray, sampled: tuple[float, Hold], effects: Sequence[PlacedEffect]
+) -> tuple[Bodies, ActuatorForce, int]:
+    """The bodies, what drives them, and the steps per sample."""
+    bodies, (rate_hz, hold) = bodies_of(model, effects), sampled
+    moves = moves_between_samples(model, effects, hold)
+    steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)
+    fine = steps if moves else 1
+    return (
+        bodies,
+        drive_actuators(model, subdivide_commands(commands, fine, hold), 1 / (rate_hz * fine), effects),
+        steps,
+    )
+
+
 def _simulate_motion(
     model: MechanicalModel,
     commands: FloatArray,
@@ -100,12 +149,8 @@ def _simulate_motion(
     restarts: Restarts | None = None,
 ) -> SimulationResult:
     """The simulation without the sensor."""
-    bodies, (rate_hz, hold) = bodies_of(model, effects), sampled
-    moves = moves_between_samples(model, effects, hold)
-    steps = max((acts.steps for acts in bodies.acts), default=STEPS if moves else 1)
-    fine = steps if moves else 1
-    driven = drive_actuators(model, subdivide_commands(commands, fine, hold), 1 / (rate_hz * fine), effects)
-    looked, added = simulate_bodies(bodies, driven, (len(commands), steps), 1 / (rate_hz * steps), axes, restarts)
+    bodies, driven, steps = _drive_bodies(model, commands, sampled, effects)
+    looked, added = simulate_bodies(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), axes, restarts)
     m, p, ports = bodies.axes if axes else 0, bodies.structure.outputs, bodies.ports.shape[1]
     rows = looked[:, 3 * ports if axes else 0 :]
     return SimulationResult(rows[:, :p], rows[:, p:], looked[:, :m], looked[:, ports : ports + m], added[:, :m])

@@ -11,9 +11,8 @@ from analysis.diagnosis.errors.choose_measure import measure_by_force
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, sensitivity
 from analysis.diagnosis.search import short_recordings
-from analysis.diagnosis.search.explain import _keep_promising
 from analysis.diagnosis.search.screening import ScreenedHypothesis
-from analysis.diagnosis.search.short_recordings import short_recordings_of
+from analysis.diagnosis.search.short_recordings import _keep_promising, short_recordings_of
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -81,6 +80,7 @@ STUCK = {"level": 0.2, "stiffness": 400.0}
 def test_friction_that_remembers_what_was_cut_out_gets_a_longer_run_in(arena_of, monkeypatch, patient):
     if not patient:
         monkeypatch.setattr(short_recordings, "RUN_IN_ERROR", np.inf)
+        monkeypatch.setattr(short_recordings, "_continue_from", lambda short, measure, held: short)
     rubbing = arena_of((PlacedEffect(EFFECTS["presliding_hysteresis"], (0,), STUCK),))
     true = held(rubbing, claim("presliding_hysteresis", **STUCK))
     short = short_recordings_of(rubbing, true)
@@ -164,8 +164,23 @@ def test_a_period_cut_off_by_the_end_of_the_record_represents_no_other(lagging):
 
 
 @pytest.mark.parametrize("coarse", [4.0, 10.0, 16.0])
-def test_laws_screened_with_longer_steps_are_kept_by_what_they_gain_there(coarse):
-    base, begun, fit = (SimpleNamespace(cost=cost) for cost in (10.0, coarse, 5.0))
-    screened = [ScreenedHypothesis(NOTHING, begun.cost - gain) for gain in (4.0, 0.1)]
-    (kept,) = _keep_promising((base, begun), [fit], screened)
-    assert kept.cost == pytest.approx(base.cost - 4.0)
+def test_laws_of_time_are_kept_by_the_share_that_they_promise_of_the_cost_there(coarse):
+    base, from_, law = (SimpleNamespace(cost=cost) for cost in (10.0, coarse, 5.0))
+    screened = [ScreenedHypothesis(NOTHING, from_.cost * (1 - share)) for share in (0.4, 0.05)]
+    assert _keep_promising((base, [law]), from_, screened) == screened[:1]
+    assert _keep_promising((base, []), from_, screened) == screened
+
+
+@pytest.fixture(scope="module")
+def rubbing(arena_of):
+    return arena_of((PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.1}),))
+
+
+def test_under_friction_each_piece_begins_as_the_whole_simulation_is_there(rubbing, monkeypatch):
+    law = held(rubbing, claim("coulomb_friction", level=0.1))
+    assert len(short_recordings_of(rubbing, law).context.measure.pieces) == 1
+    monkeypatch.setattr(short_recordings, "RUN_IN_CONSTANTS", 0.5)
+    continued = short_recordings_of(rubbing, law)
+    monkeypatch.setattr(short_recordings, "_continue_from", lambda short, measure, held: short)
+    from_rest = short_recordings_of(rubbing, law)
+    assert from_rest is None or len(from_rest.kept[0]) > 1.2 * len(continued.kept[0])
