@@ -13,7 +13,8 @@ Fits are compared by the log error power, a log-likelihood in which each channel
 4. The most promising are fitted, the best of them until convergence (`compare_candidates`).
 5. Of candidates equal within the errors, the most parsimonious is taken (`parsimony`).
 6. It is added if it removes at least `ADDED_SHARE` of the error that is left above the noise. Then the next effect is
-   looked for, up to `MOST_EFFECTS`.
+   looked for, up to `MOST_EFFECTS`. Two strong effects may hide each other: where the best alone removes less, it is
+   added with a second one if both remove twice that share.
 
 Samples to fit, to choose by and to test are disjoint: the test samples are evaluated once, at the end (`verdict`).
 
@@ -49,6 +50,7 @@ from analysis.diagnosis.settings import (
     HELD_OUT_SURPRISE,
     MOST_EFFECTS,
     NOISE_ALONE,
+    REACHES_NOISE,
     SEARCH_ON,
 )
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -56,6 +58,8 @@ from equalizer.effects.effect import Effect
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
+LOOKED_AHEAD = 2
+"""Effects beside which a second one is looked for, where none alone is worth adding; each takes a round. By hand."""
 MOST_REFITTED_RIVALS = 3
 """Rivals of a step that are fitted again where a search goes on with more samples; each takes a second or more."""
 
@@ -122,11 +126,9 @@ def explain(
     confirmed = context.with_test_score(base)
     surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     rounds = _known_rounds(context, base, begun)
-    steps = [each[0] for each in rounds]
-    base = steps[-1] if steps else base
+    base = (steps := [base, *(each[0] for each in rounds)])[-1]
     most = len(rounds) + 1 if begun else MOST_EFFECTS
-    barred, ended_early = "", False
-    within_time = replace(context, map_=limit_map(context.map_, time_left))
+    within_time, barred, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", False
     more = SEARCH_ON * (1.0 if context.references is None else context.references.beyond)
     while (
         not context.certain
@@ -136,18 +138,41 @@ def explain(
         step = Step(f"looking for the {_ORDINALS[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
         try:
             tried = find_next_effect(within_time, catalogue, base.fitted, step)
+            named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
+            both = _look_ahead(within_time, catalogue, base, named, step) if len(rounds) + 1 < most else ()
         except OutOfTimeError:
             ended_early = True
             break
-        named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
-        rounds.append(named)
-        if not named or not is_worthwhile(base, named[0]) or named[0] is not tried[0]:
+        rounds += both or (named,)
+        if not both and (not named or not is_worthwhile(base, named[0]) or named[0] is not tried[0]):
             barred = tried[0].newest if named and is_worthwhile(base, named[0]) else ""
             break
-        base = named[0]
-        steps.append(base)
+        steps += [each[0] for each in both or (named,)]
+        base = steps[-1]
     ends = (context.with_test_score(context.candidate(before)), confirmed, context.with_test_score(base))
-    return Explanation(*ends, tuple(rounds), tuple(steps), ended_early=ended_early, barred=barred)
+    return Explanation(*ends, tuple(rounds), tuple(steps[1:]), ended_early=ended_early, barred=barred)
+
+
+def _look_ahead(
+    context: SearchContext,
+    catalogue: Sequence[Effect],
+    base: FittedCandidate,
+    named: tuple[FittedCandidate, ...],
+    step: "Step",
+) -> tuple[tuple[FittedCandidate, ...], ...]:
+    """Two rounds, of an effect that alone is not worth adding and of one beside which it is: together they remove twice
+    the share. None where the best of `named` is worth adding, or where no such pair is found."""
+    if not named or is_worthwhile(base, named[0]) or base.score.worst_channel <= REACHES_NOISE:
+        return ()
+    seen = {candidate.newest: candidate for candidate in reversed(named)}
+    for first in [candidate for candidate in named if seen[candidate.newest] is candidate][:LOOKED_AHEAD]:
+        if base.score.mean_log_error - first.score.mean_log_error <= ADDED_GAIN:
+            break
+        tried = find_next_effect(context, catalogue, first.fitted, step)
+        gained = base.score.mean_log_error - tried[0].score.mean_log_error if tried else 0.0
+        if gained > 2 * ADDED_SHARE * excess(base) and tried[0].newest not in context.barred:
+            return (first, *(other for other in named if other is not first)), tried
+    return ()
 
 
 def _known_rounds(
