@@ -2,13 +2,15 @@
 must. On two axes, friction at the first one."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.search.explain import is_worthwhile
+from analysis.diagnosis.search import explain
+from analysis.diagnosis.search.explain import _look_ahead, is_worthwhile
 from analysis.diagnosis.search.search import ONLY_REFINES
 from analysis.diagnosis.settings import ADDED_GAIN, INTERVAL_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
@@ -165,3 +167,26 @@ def test_an_effect_that_leaves_the_one_bad_channel_as_bad_is_not_added(standing_
     better = standing_at([left, 0.9, 0.9, 0.94], "quadratic_damping")
     assert base.score.mean_log_error - better.score.mean_log_error > ADDED_GAIN
     assert is_worthwhile(base, better) is worth
+
+
+@pytest.mark.parametrize(("left", "added"), [(3.0, True), (38.0, False)])
+def test_two_effects_that_hide_each_other_are_added_together(standing_at, monkeypatch, left, added):
+    """Alone each leaves 42 of 50 times the noise, less than a share worth adding."""
+    base, first = standing_at([50.0]), standing_at([42.0], "cogging")
+    again, other = standing_at([42.5], "cogging"), standing_at([43.0], "quadratic_damping")
+    both = standing_at([left], "cogging", "force_deadband")
+    tried = []
+
+    def find_next(context, catalogue, held, step):
+        tried.append(held.hypothesis.claims[-1].effect.name)
+        return (both,) if tried[-1] == "cogging" else (standing_at([41.0], "quadratic_damping", "cogging"),)
+
+    monkeypatch.setattr(explain, "find_next_effect", find_next)
+    context = SimpleNamespace(barred=frozenset())
+    rounds = _look_ahead(context, (), base, (first, again, other), None)
+    assert rounds == (((first, again, other), (both,)) if added else ())
+    assert tried == (["cogging"] if added else ["cogging", "quadratic_damping"])
+    assert not _look_ahead(context, (), base, (standing_at([5.0], "cogging"),), None)
+    near = standing_at([1.9])
+    assert not _look_ahead(context, (), near, (standing_at([1.8], "cogging"),), None)
+    assert not _look_ahead(SimpleNamespace(barred={"force_deadband"}), (), base, (first,), None)
