@@ -7,7 +7,7 @@ import pytest
 
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import AxisForce, PlacedEffect
-from equalizer.effects.simulation.bodies import bodies_of, simulate_bodies
+from equalizer.effects.simulation.bodies import Restarts, bodies_of, simulate_bodies
 from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.instant import (
     A_FREE,
@@ -25,10 +25,16 @@ from equalizer.effects.simulation.instant import (
 )
 from equalizer.effects.simulation.mechanism_kernel import SETTLED, compile_law
 from equalizer.effects.simulation.modal_form import step_form
-from equalizer.effects.simulation.simulator import simulate_mechanism, simulate_response
+from equalizer.effects.simulation.simulator import (
+    simulate_mechanism,
+    simulate_pieces,
+    simulate_response,
+    states_before,
+)
 from equalizer.effects.simulation.stepping import BLOCK
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Hold
 
 RATE_HZ, SAMPLES = 1000.0, 400
 WITHIN, RUBBING, TOGETHER = 1e-9, 1e-6, 2 * SETTLED
@@ -215,3 +221,20 @@ def test_pairs_are_used_where_they_are_well_apart_and_say_the_same(model, pairs)
 
 def test_an_advance_that_is_not_finite_is_stepped_as_it_is():
     assert step_form(np.full((2, 2), np.inf)).advance.shape == (2, 2)
+
+
+@pytest.mark.parametrize("named", [(), (SMOOTH,), (("hardening_stiffness", (2,), {"k3": 1e7}), SMOOTH)])
+def test_pieces_begun_in_the_states_of_the_whole_go_on_as_the_whole_does(bench, named):
+    commands, effects, model = bench.commands(3)[:SAMPLES], placed(*named), bench.three_axes()
+    sampled, starts = (RATE_HZ, Hold.ZERO_ORDER), np.array([90, 250])
+    whole = simulate_response(model, commands, RATE_HZ, effects)
+    states = states_before(model, commands, sampled, effects, starts)
+    kept = np.r_[90:150, 250:400]
+    joined = Restarts(np.array([0, 60]), states)
+    pieces = simulate_pieces(model, commands[kept], sampled, effects, None, joined)
+    # The sensor's low-pass forgets within some samples what it saw before a piece.
+    inside = np.r_[40:60, 100:210]
+    np.testing.assert_allclose(pieces.response[inside], whole.response[kept][inside], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(pieces.position, whole.position[kept], rtol=0, atol=1e-12)
+    from_rest = simulate_response(model, commands[kept], RATE_HZ, effects)
+    assert np.abs(from_rest.position[:60] - whole.position[90:150]).max() > 1e-5
