@@ -7,6 +7,8 @@ from protocols.definition.staircase_rule import StaircaseRule
 
 @dataclass(frozen=True, slots=True)
 class ThresholdWords:
+    """Sentences and nouns on a run's threshold, for a single kind of rule."""
+
     means: str
     """Thresholds of runs, in the plural; begins small."""
     cut: str
@@ -61,6 +63,7 @@ def _psi(rule: StaircaseRule) -> ThresholdWords:
 
 
 def threshold_words(rule: StaircaseRule) -> ThresholdWords:
+    """The words for a rule: those of Psi's posterior where the rule is Bayesian, else those of reversals."""
     return _psi(rule) if rule.is_bayesian else REVERSALS
 
 

@@ -26,6 +26,7 @@ def typeset(formatted: str) -> str:
 
 
 def number(value: float | None, digits: int = 2) -> str:
+    """A number with `digits` decimals and a true minus sign; a dash for None."""
     return NONE if value is None else typeset(f"{value:.{digits}f}")
 
 
@@ -40,10 +41,12 @@ def mark_cut(value: float | None, cut: bool, digits: int = 2) -> str:
 
 
 def count(value: int | None) -> str:
+    """An integer as text; a dash for None."""
     return NONE if value is None else str(value)
 
 
 def p_value(p: float | None) -> str:
+    """A p-value with four decimals, or "< 0.0001"; a dash for None."""
     if p is None:
         return NONE
     return "< 0.0001" if p < 0.0001 else f"{p:.4f}"
@@ -56,6 +59,7 @@ def p_text(p: float | None) -> str:
 
 
 def f_text(df_first: int | None, df_second: int | None, f: float | None) -> str:
+    """An F statistic with its degrees of freedom, such as "F(4, 45) = 3.20"."""
     return f"F({count(df_first)}, {count(df_second)}) = {number(f)}"
 
 
@@ -67,6 +71,7 @@ def conjoin(things: Sequence[str]) -> str:
 
 
 def capitalise(sentence: str) -> str:
+    """The sentence with its first character in upper case and all others unchanged, unlike `str.capitalize`."""
     return sentence[:1].upper() + sentence[1:]
 
 
@@ -77,6 +82,7 @@ def begin_sentence(sentence: str) -> str:
 
 
 def end_sentence(sentence: str) -> str:
+    """The sentence with a full stop added, unless it ends with a mark or is empty."""
     return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."
 
 

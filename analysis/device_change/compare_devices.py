@@ -18,6 +18,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class ChangeLimits:
+    """Limits within which two measurements of a device count as equal, by hand or from the staircase's step."""
+
     step_db: float = 1.0
     """Limit of gain and response: the finest step of the published staircases. A smaller change moves a threshold by
     less than a step."""

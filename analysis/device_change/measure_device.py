@@ -24,6 +24,8 @@ class NotMeasurableError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DeviceMeasures:
+    """Friction, frequency response and noise of a free device, from a single recording."""
+
     friction_n: FloatArray
     """(axes,): mean force that resisted the strokes along each axis; NaN where the handle did not move."""
     friction_error_n: FloatArray

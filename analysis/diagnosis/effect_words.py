@@ -13,6 +13,8 @@ _BARE = "{}"
 
 @dataclass(frozen=True, slots=True)
 class EffectWords:
+    """Words for an effect of the vocabulary: its noun, and how its parameters are printed."""
+
     noun: str
     numbers: Mapping[str, str] = field(default_factory=dict)
     """Words by parameter, in the order of printing; other parameters are not printed. Empty text: the main
@@ -249,6 +251,7 @@ def numbers_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
 
 
 def estimate_text(estimate: Estimate, share: bool = False) -> str:
+    """An estimate with its unit and 95 % interval. share: print it in per cent."""
     if share:
         return percent_text(estimate.value, estimate.ci95)
     return value_text(estimate.value, estimate.unit, estimate.ci95)

@@ -27,6 +27,7 @@ class FoundLaw:
 
 
 def found_law(law: Law) -> FoundLaw:
+    """The law's text, variables, place and axis as an entry of the document."""
     return FoundLaw(law.text, law.variables, law.acts_on, law.axis)
 
 

@@ -23,6 +23,8 @@ STILL = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedRecordings:
+    """The recordings in the form that a diagnosis takes, and what was done to them."""
+
     recordings: tuple[Recording, ...]
     remarks: tuple[str, ...] = ()
     """Sentences about what was changed, and what is weak."""

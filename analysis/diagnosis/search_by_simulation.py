@@ -33,6 +33,8 @@ GAINS = ("force_gain", "sensor_gain")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchOutcome:
+    """A search's result with the model error that was learned from clean recordings."""
+
     result: SearchResult
     floor: CleanFloor
     """Model error of the clean recordings; empty without any."""

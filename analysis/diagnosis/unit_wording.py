@@ -89,6 +89,7 @@ def error_of_signal(error: float | None) -> str:
 
 
 def probability_text(probability: float) -> str:
+    """A probability with two decimals; "< 0.01" and "> 0.99" beyond."""
     return f"{probability:.2f}" if 0.01 <= probability <= 0.99 else ("< 0.01", "> 0.99")[probability > 0.5]
 
 

@@ -42,6 +42,8 @@ def frequency_bands_picture(
 def draw_frequency_bands(
     response: FrequencyResponse, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float
 ) -> Figure:
+    """Figure of the measured coupling above, and of perception and control by band below, over a logarithmic frequency
+    axis."""
     figure = new_figure(8.6, 4.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1])
     lowest, highest = bands[0].low_hz, bands[-1].high_hz

@@ -25,6 +25,7 @@ def model_order_picture(report: OrderReport, chosen: int) -> Picture:
 
 
 def draw_model_order(report: OrderReport, chosen: int) -> Figure:
+    """Figure of singular values (left) and errors by order (right). chosen: order of the model."""
     figure = new_figure(8.6, 3.2)
     left, right = figure.subplots(1, 2)
     _draw_singular_values(left, report)

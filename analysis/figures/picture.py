@@ -53,6 +53,8 @@ def _escape_markup(text: str) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
+    """A figure with its name, title, caption and alternative text."""
+
     name: str
     """Letters, digits, hyphens: the name of its file, and of its place in the page."""
     title: str

@@ -21,6 +21,7 @@ _TICKS_HZ = (5, 10, 20, 35)
 
 
 def played_responses_picture(rows: Sequence[PlayedResponse]) -> Picture:
+    """Picture of delivered over wanted acceleration, with its caption for the rows of the equalizer."""
     return Picture(
         name="equalized-response",
         title="What is played, with and without the equalizer",
@@ -33,6 +34,7 @@ def played_responses_picture(rows: Sequence[PlayedResponse]) -> Picture:
 
 
 def friction_picture(rows: Sequence[PlayedResponse]) -> Picture:
+    """Picture of delivered over wanted acceleration, with its caption for the rows with and without friction."""
     return Picture(
         name="equalized-friction",
         title="What friction costs",

@@ -17,6 +17,8 @@ NO_ANSWER = "no name"
 
 
 def proof_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
+    """Pictures of detection, sizes and confusion where single effects were drawn, and of reliability where names were
+    given."""
     singles = [outcome for outcome in outcomes if outcome.kind == "single"]
     pictures = []
     if singles:

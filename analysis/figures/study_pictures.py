@@ -35,6 +35,7 @@ def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult
 
 
 def ellipsoid_picture(ellipsoids: Sequence[EllipsoidResult]) -> Picture:
+    """Picture of the acceleration ellipses by frequency, with its caption."""
     return Picture(
         name="ellipsoids",
         title="Acceleration ellipses by frequency",

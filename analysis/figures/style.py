@@ -26,6 +26,7 @@ PAGE_IN = 7.2
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty white figure whose layout fits itself; sizes in inches."""
     return Figure(figsize=(width_in, height_in), facecolor="white", layout="constrained")
 
 
@@ -39,6 +40,7 @@ def plain_axes(axes: Axes) -> None:
 
 
 def participant_colour(number: int) -> str:
+    """Colour of a participant by number from 0; colours recur after the last of `COLOURS`."""
     return COLOURS[number % len(COLOURS)]
 
 
@@ -94,5 +96,6 @@ def power_of_ten(value: float) -> str:
 
 
 def draw_no_data_note(figure: Figure, sentence: str) -> Figure:
+    """The figure with a sentence in its middle in place of a plot."""
     figure.text(0.5, 0.5, sentence, ha="center", va="center", fontsize=11, color=GREY)
     return figure

@@ -50,6 +50,8 @@ def transfer_functions_picture(
 def draw_transfer_functions(
     response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
 ) -> Figure:
+    """Figure of the magnitudes of all entries, a row per output and a column per input. model: dashed; band_hz:
+    shaded."""
     if not len(response):
         return draw_no_data_note(new_figure(8.6, 2.0), "There is no line to draw.")
     outputs, inputs = response.response.shape[1:]

@@ -19,6 +19,8 @@ _NEARER = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
+    """Gain and lag of a second signal relative to a first, and the evidence for them."""
+
     factor: float
     """Gain of the second signal relative to the first; negative where the sign is reversed."""
     spread: float

@@ -16,6 +16,8 @@ Stretch = tuple[int, int]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
+    """The samples of a channel with its role, name, quantity and unit."""
+
     role: str
     """command, response, position, excitation or condition."""
     name: str
@@ -39,6 +41,7 @@ class Channel:
 
 
 def channels_of(recording: Recording) -> tuple[Channel, ...]:
+    """All channels of all signals of a recording."""
     return tuple(
         Channel(role, name, quantity, unit, np.ascontiguousarray(samples))
         for role, signal in signals_of(recording).items()
@@ -54,6 +57,7 @@ def stretches_of(recording: Recording) -> tuple[Stretch, ...]:
 
 
 def format_value(value: float, unit: str, digits: int = 3) -> str:
+    """A value with its unit, to `digits` significant digits; the unit "1" is not written."""
     return f"{typeset(f'{value:.{digits}g}')}{'' if unit == '1' else f' {unit}'}"
 
 

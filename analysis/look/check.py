@@ -9,6 +9,8 @@ Level = Literal["fine", "notice", "wrong"]
 
 @dataclass(frozen=True, slots=True)
 class Check:
+    """Result of a check, with its level and advice."""
+
     name: str
     """Name of the check: "clipping"."""
     level: Level

@@ -30,6 +30,7 @@ _CROWDED = 4.0
 
 
 def check_clipping(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    """A check of each clipped channel, excitations left out; a single "fine" check where none is clipped."""
     found = tuple(check for channel in channels if channel.role != "excitation" for check in _channel_checks(channel))
     return fine_if_none(CLIPPING, found, "No channel is flat at its extremes.")
 

@@ -20,6 +20,7 @@ DRIFT_PPM, RATE_PPM = 100.0, 5000.0
 
 
 def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Check, ...]:
+    """Checks of the time stamps in each stretch; without stamps, of the stated rate and of resampling."""
     if recording.meta.get("time") == "unknown":
         return (
             Check(

@@ -19,6 +19,7 @@ _FIRST_FEW = 1000
 
 
 def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[Check, ...]:
+    """A check of each channel with missing samples; a single "fine" check where no channel has any."""
     found = tuple(_missing_check(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all())
     return fine_if_none(MISSING, found, "No sample is missing in any channel.")
 

@@ -20,6 +20,8 @@ MOST_WINDOWS = 400
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CrossSpectra:
+    """Power and cross spectral densities of all channels, averaged over windows."""
+
     frequency_hz: FloatArray
     """(lines,), without the mean's."""
     matrix: ComplexArray

@@ -25,6 +25,8 @@ _HEARD = 0.01
 
 @dataclass(frozen=True, slots=True)
 class DrivenBand:
+    """The frequency band that a command drives."""
+
     command: str
     low_hz: float
     high_hz: float
@@ -32,6 +34,8 @@ class DrivenBand:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResponseCoherence:
+    """Multiple coherence of a response with all commands, and where in the driven band it is lowest."""
+
     response: str
     multiple: FloatArray
     """(lines,): share of its power that all commands together explain linearly, 0 to 1."""

@@ -38,6 +38,8 @@ _CAUSES = (
 
 @dataclass(frozen=True, slots=True)
 class KinematicPair:
+    """Two channels of which the second should be the derivative of the first, and how far they agree."""
+
     place: str
     """Label of the channel that is differentiated."""
     derivative: str
@@ -97,6 +99,7 @@ def _difference_gain(spectra: CrossSpectra, order: int, rate_hz: float) -> Float
 
 
 def kinematic_checks(pairs: Sequence[KinematicPair], rate_hz: float) -> tuple[Check, ...]:
+    """A check of each pair, by sign, factor and lag."""
     return tuple(_pair_check(pair, rate_hz) for pair in pairs)
 
 

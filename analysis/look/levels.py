@@ -19,6 +19,8 @@ EVEN, UNEVEN = 0.05, 0.3
 
 @dataclass(frozen=True, slots=True)
 class SegmentLevel:
+    """A segment with its times and the rms of every channel in it."""
+
     number: int
     """Number of the segment from 1; 0 for a recording without segments."""
     kind: str
@@ -31,6 +33,7 @@ class SegmentLevel:
 
 
 def segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[SegmentLevel, ...]:
+    """Levels of all segments, or of the whole recording where it has no segments."""
     whole = (Segment(0, len(recording), "unmarked"),)
     rate_hz = recording.sample_rate_hz
     return tuple(

@@ -59,6 +59,8 @@ def _resolution_check(channel: Channel) -> Check | None:
 
 @dataclass(frozen=True, slots=True)
 class ChannelSummary:
+    """Range, mean, rms and number of missing samples of a channel, in its unit."""
+
     role: str
     name: str
     quantity: str
@@ -73,6 +75,8 @@ class ChannelSummary:
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class Overview(Summarised):
+    """Results of a recording that need no model: spectra, levels, repeats, consistency and checks."""
+
     name: str
     recording: Recording
     channels: tuple[Channel, ...]

@@ -25,6 +25,7 @@ STRONG = 0.5
 
 
 def check_units(channels: Sequence[Channel]) -> tuple[Check, ...]:
+    """A check of each channel whose values are doubtful in its unit; a single "fine" check where none is."""
     found = tuple(check for channel in channels if (check := _unit_check(channel)))
     return fine_if_none(UNITS, found, "All sizes are possible in their units.")
 

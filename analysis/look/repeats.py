@@ -39,6 +39,8 @@ class RepeatNoise:
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
+    """A period that was detected but not declared, and the noise between repeats."""
+
     found: int
     """Samples of a period that was not declared; 0 = none."""
     found_in: Stretch
@@ -46,6 +48,8 @@ class Repeats:
 
 
 def find_repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
+    """Noise between repeats of declared periods. Where none is declared, a period is sought in the longest segment,
+    then in the longest stretch."""
     if any(segment.period for segment in recording.segments):
         return Repeats(0, (0, 0), _noise_between_repeats(recording, declared=True))
     marked = [(segment.start, segment.stop) for segment in recording.segments]
@@ -73,6 +77,8 @@ def _noise_between_repeats(recording: Recording, *, declared: bool) -> tuple[Rep
 
 
 def repeat_checks(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
+    """Checks of declared periods, of an undeclared period, and of the noise between repeats; a notice where nothing
+    repeats."""
     wrong = [check for check in _period_checks(recording) if check is not None]
     if repeats.found:
         times = (repeats.found_in[1] - repeats.found_in[0]) / repeats.found

@@ -17,6 +17,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class GroupSummary:
+    """Number, mean and standard deviation of a group's values."""
+
     name: str
     n: int
     mean: float | None

@@ -22,6 +22,8 @@ CRITERION_WORDS = "c = −(z(H) + z(F)) / 2 with answer 1 as the hit; positive: 
 
 @dataclass(frozen=True, slots=True)
 class ResponseBias:
+    """Sensitivity d' and criterion c of a run by signal detection theory."""
+
     d_prime: float
     """d' over all levels of the run: it describes the run and is not a threshold."""
     criterion: float

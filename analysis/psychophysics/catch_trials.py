@@ -17,6 +17,8 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class CatchTally:
+    """Catch trials of a participant at a frequency, and the lapse rate with its 95 % interval."""
+
     subject: str
     frequency_hz: float
     given: int

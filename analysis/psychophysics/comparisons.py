@@ -20,6 +20,8 @@ from analysis.psychophysics.anova import GroupSummary, OneWayAnova
 
 @dataclass(frozen=True, slots=True)
 class PairDifference:
+    """Difference of two group means, its simultaneous confidence interval and p-value (Tukey-Kramer)."""
+
     first: str
     second: str
     difference: float
@@ -31,6 +33,8 @@ class PairDifference:
 
 @dataclass(frozen=True, slots=True)
 class ComparisonInterval:
+    """A group's mean and its comparison interval, which is not a confidence interval."""
+
     name: str
     mean: float
     lower: float
@@ -39,6 +43,8 @@ class ComparisonInterval:
 
 @dataclass(frozen=True, slots=True)
 class Comparisons:
+    """Multiple comparisons of group means: every pair, and a comparison interval for each group."""
+
     confidence: float
     """Simultaneous, over all pairs."""
     critical_range: float | None

@@ -39,6 +39,8 @@ class ContrastResult:
 
 @dataclass(frozen=True, slots=True)
 class DeclaredResult:
+    """The declared contrast by each analysis, and the declared beside the actual sample and exclusions."""
+
     primary: Literal["undeclared", "hierarchical", "published"]
     contrast_hz: tuple[float, ...]
     """The two frequencies of the contrast; empty where none is declared."""

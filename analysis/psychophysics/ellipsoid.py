@@ -65,6 +65,8 @@ class PhasorEllipse:
 
 @dataclass(frozen=True, slots=True)
 class EllipsoidResult:
+    """Acceleration ellipses by both definitions, at a frequency and along a test direction."""
+
     frequency_hz: float
     along: str
     amplitude_n: float

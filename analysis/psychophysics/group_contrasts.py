@@ -26,6 +26,8 @@ ROUNDING_DB = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Contrast:
+    """Mean difference in dB between thresholds at two frequencies within participants, with its tests."""
+
     frequency_hz: float
     against_hz: float
     participants: int

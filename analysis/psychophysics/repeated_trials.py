@@ -19,6 +19,7 @@ OFTEN_WORDS = f"at least {OFTEN_COUNT}, and at least {100 * OFTEN_RATE:g} % of t
 
 
 def is_often(repeats: int, presentations: int) -> bool:
+    """Whether repeats are at least `OFTEN_COUNT`, and at least the share `OFTEN_RATE` of the presentations."""
     return repeats >= OFTEN_COUNT and repeats >= OFTEN_RATE * presentations
 
 

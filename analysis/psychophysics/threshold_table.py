@@ -12,6 +12,8 @@ Quantity = Literal["threshold_n", "threshold_db", "threshold_mps2", "threshold_m
 
 @dataclass(frozen=True, slots=True)
 class ThresholdTable:
+    """Thresholds by participant and frequency, with what was cut, stopped or left out."""
+
     quantity: Quantity
     subjects: tuple[str, ...]
     frequencies_hz: tuple[float, ...]
@@ -93,6 +95,7 @@ def threshold_table(
 
 
 def frequency_name(frequency_hz: float) -> str:
+    """Name of a frequency's group, such as "35 Hz"."""
     return f"{frequency_hz:g} Hz"
 
 

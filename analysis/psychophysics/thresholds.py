@@ -83,6 +83,8 @@ def thresholds(trials: Iterable[Trial], rule: StaircaseRule, rove_db: float = 0.
 
 
 def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
+    """Threshold of a run by its reversals or Psi's posterior, with response bias and counts; None in its values where
+    the run is not complete."""
     found = _from_posterior(run, rule) if rule.is_bayesian else _from_reversals(run, rule)
     state = run.state
     correct = [bool(trial.correct) for trial in run.answered]

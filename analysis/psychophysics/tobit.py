@@ -32,6 +32,8 @@ STEP = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TobitFit:
+    """Maximum-likelihood estimate of Tobit's model of reversal means."""
+
     numbers: FloatArray
     """(k + 2,): means in dB, log SD of people, log SD of the error."""
     covariance: FloatArray

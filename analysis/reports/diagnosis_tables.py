@@ -24,6 +24,7 @@ _PARTS: Mapping[str, str] = {"fit": "the data that were fitted to", "test": "hel
 
 
 def parameter_table(effect: NamedEffect) -> Table:
+    """Table of an effect's parameters with their 95 % intervals."""
     rows = tuple(
         (name.replace("_", " "), estimate_text(parameter).partition(" [")[0], _interval_text(parameter))
         for name, parameter in effect.parameters.items()
@@ -32,6 +33,8 @@ def parameter_table(effect: NamedEffect) -> Table:
 
 
 def rival_table(effect: NamedEffect) -> Table:
+    """Table of a named effect and its rivals, with probabilities and reasons; rivals that cannot be distinguished come
+    first."""
     rows = [(capitalise(noun_of(effect.effect)), probability_text(effect.probability), "named", "")]
     rows += [
         (

@@ -24,6 +24,8 @@ CURVE_LINES = 400
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentificationFindings:
+    """The content of an identification report: the measured response, the model, and what follows from them."""
+
     estimate: FrequencyResponse
     model: IdentifiedModel
     resonances: tuple[Resonance, ...]
@@ -52,6 +54,7 @@ def identification_pictures(found: IdentificationFindings) -> tuple[Picture, ...
 def render_identification_report(
     found: IdentificationFindings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
+    """The report as a page of HTML. pictures: by name; those that are missing are left out."""
     by_name = {picture.name: picture for picture in pictures}
     low, high = found.model.band_hz
 

@@ -8,6 +8,7 @@ from analysis.reports.page import Section, Table
 
 
 def injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
+    """Section with rates of right answers, tallies by kind and by recording, and all misses."""
     rates = Table(
         "How often it was right",
         ("what", "rate, 95 % interval"),
@@ -48,6 +49,7 @@ def injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
 
 
 def kind_of(injected_outcome: InjectedOutcome) -> str:
+    """The injected fault's name, "two at once" for two, or empty for none."""
     return "two at once" if len(injected_outcome.effects) > 1 else injected_outcome.injected
 
 

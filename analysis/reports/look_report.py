@@ -34,6 +34,7 @@ def render_look_report(
 
 
 def pictures_of(found: Sequence[Overview]) -> tuple[tuple[Picture, ...], ...]:
+    """Pictures of each recording; recordings are numbered from 1."""
     return tuple(look_pictures(each, place) for place, each in enumerate(found, start=1))
 
 

@@ -22,6 +22,8 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Section:
+    """A section of a report: a heading, and its text, pictures and tables."""
+
     heading: str
     paragraphs: tuple[str, ...] = ()
     points: tuple[str, ...] = ()
@@ -32,6 +34,8 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Page:
+    """A whole report, as `render_page` takes it."""
+
     title: str
     summary: str
     banner: str

@@ -37,6 +37,8 @@ TOBIT_MEANING = (
 
 
 def primary_section(analysis: StudyAnalysis) -> Section:
+    """Section on the model of all answers: medians, contrasts, runs, persons and goodness of fit. Without that model, a
+    section on thresholds by likelihood of single persons, or on why there are none."""
     primary, means = analysis.primary, analysis.mean_contrasts
     if primary is None:
         return _single_section(analysis)
@@ -91,6 +93,8 @@ def _overall(primary: PrimaryAnalysis) -> str:
 
 
 def limit_words(primary: PrimaryAnalysis) -> str:
+    """Sentence on the direction limit: the frequency at which the median participant's threshold reaches the cap, with
+    its interval."""
     limit = primary.limit
     low, high = primary.frequencies_hz[0], primary.frequencies_hz[-1]
     lower = f"{limit.lower_hz:.1f} Hz" if limit.lower_hz is not None else f"below {low:g} Hz"

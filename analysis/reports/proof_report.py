@@ -26,6 +26,8 @@ HOW = (
 
 @dataclass(frozen=True, slots=True)
 class ProofFacts:
+    """Facts of a proof beside its outcomes: seeds, seal, commit, engines, controls and further recordings."""
+
     seeds: str
     seal: str
     commit: str

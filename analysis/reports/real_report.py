@@ -62,6 +62,8 @@ def render_real_report(
 
 
 def overview_table(answers: Sequence[RealAnswer]) -> Table:
+    """Table of all recordings: verdict, named effects, held-out errors of each model as shares of the signal, and
+    seconds."""
     header = ("recording", "verdict", "named", "as given", "re-tuned", "with what was found", "black box", "noise", "s")
     return Table("Errors on held-out data, shares of the signal", header, tuple(_row(answer) for answer in answers))
 
@@ -139,6 +141,8 @@ def _tables(real_answer: RealAnswer) -> tuple[Table, ...]:
 
 
 def number_sentence(number: OwnNumber) -> str:
+    """Sentence that compares a fitted number of the model with its value known by other means, where there is such a
+    value."""
     ends = None if number.low is None or number.high is None else (number.low, number.high)
     text = f"The model's {number.name} is {value_text(number.value, number.unit, ends)} after everything"
     if number.nominal is None:

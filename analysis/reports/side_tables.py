@@ -33,6 +33,8 @@ def detection_table(analysis: StudyAnalysis) -> Table:
 
 
 def detection_run_table(analysis: StudyAnalysis) -> Table:
+    """Table of all detection runs: thresholds in newtons, trials, share of right answers, d' of two intervals, and
+    criterion."""
     turns = () if analysis.protocol.staircase.is_bayesian else ("Reversals",)
     return Table(
         caption="All detection runs",
@@ -73,6 +75,7 @@ def _percent(share: float | None) -> str:
 
 
 def catch_table(analysis: StudyAnalysis) -> Table:
+    """Table of catch trials by participant and frequency, with the lapse rate and its 95 % interval."""
     return Table(
         caption="Catch trials",
         header=("Participant", "Frequency", "Given", "Wrong", "Lapse rate", "95 % interval"),
@@ -95,6 +98,7 @@ def catch_table(analysis: StudyAnalysis) -> Table:
 
 
 def practice_table(analysis: StudyAnalysis) -> Table:
+    """Table of practice runs, with right answers and whether each was passed, not passed or broken off."""
     settings = analysis.protocol.practice
     return Table(
         caption="Practice runs",

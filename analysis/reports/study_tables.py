@@ -14,6 +14,8 @@ from analysis.wording import NONE, count, mark_cut, number, p_value, signed_numb
 
 
 def threshold_table_text(analysis: StudyAnalysis) -> Table:
+    """Table of thresholds in newtons, a row per participant and a column per frequency; thresholds that the cap cut are
+    marked."""
     table = analysis.table
     rows = [
         (subject, *("stopped" if stop else mark_cut(value, cut) for value, cut, stop in zip(*cells, strict=True)))
@@ -31,6 +33,8 @@ def threshold_table_text(analysis: StudyAnalysis) -> Table:
 
 
 def group_table(analysis: StudyAnalysis) -> Table:
+    """Table of the frequencies: number, mean and standard deviation of thresholds, comparison interval, and how many
+    were cut by the cap or stopped by the trial limit."""
     intervals = {interval.name: interval for interval in analysis.comparisons.intervals}
     cuts, stops = (
         [sum(column) for column in zip(*cells, strict=True)]
@@ -93,6 +97,7 @@ def one_way_table(analysis: StudyAnalysis) -> Table:
 
 
 def pair_table(analysis: StudyAnalysis) -> Table:
+    """Table of all pairs of frequencies: difference of the means, simultaneous interval and p-value."""
     comparisons = analysis.comparisons
     percent = f"{100 * comparisons.confidence:g} %"
     return Table(
@@ -151,6 +156,7 @@ TURNS = "Reversals at the cap: of the averaged ones. Pushes: how often the rule 
 
 
 def run_table(analysis: StudyAnalysis) -> Table:
+    """Table of all runs with their trials, thresholds, d' and criterion; reversals only for staircases."""
     by_reversals = not analysis.protocol.staircase.is_bayesian
     turns: tuple[tuple[str, Callable[[Threshold], str]], ...] = (
         ("Reversals", lambda row: str(row.reversals)),
@@ -202,6 +208,8 @@ def _repeats(row: Threshold) -> str:
 
 
 def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
+    """Table of acceleration ellipses: ratio of the axes and tilt, by mean squares and by phasors; off-axis ratio;
+    harmonics."""
     return Table(
         caption="Acceleration ellipses",
         header=(

@@ -49,6 +49,7 @@ class Channels:
 
 
 def law_channels(recording: Recording) -> Channels:
+    """Channel names by which laws call a recording's signals; the quantity is that of the first response channel."""
     response, condition = recording.response, recording.condition
     return Channels(
         recording.command.channels, response.channels, response.quantities[0], condition.channels if condition else ()
@@ -112,14 +113,17 @@ def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ..
 
 
 def law_values(law: Law) -> Values:
+    """Values p0, p1, … of the law's effect: the law's free numbers in their order."""
     return {f"p{place}": number for place, number in enumerate(law.numbers)}
 
 
 def law_with_values(law: Law, values: Values) -> Law:
+    """The law with the values p0, p1, … as its free numbers; the inverse of `law_values`."""
     return law.with_numbers([values[f"p{place}"] for place in range(len(law.numbers))])
 
 
 def law_parameters(law: Law) -> tuple[Parameter, ...]:
+    """Parameters p0, p1, … for a fit: range and scale follow from each number's role in the formula, and its sign."""
     found = roles(law.tree)
     none = 0.0 if law.acts_on == "force" or _adds_to_signal(law.tree) else None
     return tuple(_parameter(f"p{place}", number, found[place], none) for place, number in enumerate(law.numbers))

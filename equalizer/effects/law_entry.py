@@ -28,6 +28,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class LawEntry:
+    """A discovered law as the library keeps it: under a name, with its origin."""
+
     name: str
     law: Law
     """The law with its starting numbers, and the axis whose signals its formula calls by their letter."""

@@ -25,6 +25,8 @@ DEEPEST = 32
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
+    """Formula as a program for a stack machine (postfix notation); made by `program_of`."""
+
     codes: FloatArray
     """(k, 2): operation, and its number, column of a signal, or index in the memory."""
     free: tuple[tuple[int, int], ...]

@@ -24,11 +24,15 @@ class Free:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
+    """A signal by its name, or the constant `pi`."""
+
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class Apply:
+    """An operator or a function applied to its arguments."""
+
     name: str
     """An operator + - * / **, `neg`, or a function, with its arguments."""
     parts: tuple["Node", ...]

@@ -20,6 +20,8 @@ RESPONSE = "response"
 
 @dataclass(frozen=True, slots=True)
 class EffectParameter:
+    """Name and unit of a parameter of an effect, as model files state it."""
+
     name: str
     unit: str
     """SI unit in a translational model; RESPONSE stands for that of the response."""
@@ -39,6 +41,8 @@ class EffectParameter:
 
 @dataclass(frozen=True, slots=True)
 class EffectName:
+    """Name of an effect, the place where it acts, and its parameters."""
+
     name: str
     place: Place
     parameters: tuple[EffectParameter, ...]

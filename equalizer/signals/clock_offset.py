@@ -23,6 +23,8 @@ class NoOffsetError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class ClockOffset:
+    """Offset between the clocks of two recordings of the same motion."""
+
     offset_s: float
     """Added to the other clock's time to give the reference's."""
     correlation: float

@@ -54,6 +54,7 @@ def concatenate_if_all(signals: Sequence[Signal | None]) -> Signal | None:
 
 
 def concatenate(signals: Sequence[Signal]) -> Signal:
+    """The signals end to end. Raises ValueError where channels or units differ."""
     first = signals[0]
     if any((s.channels, s.unit) != (first.channels, first.unit) for s in signals):
         raise ValueError(f"not all parts have the channels {', '.join(first.channels)} in {first.unit}")

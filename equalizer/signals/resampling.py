@@ -48,6 +48,8 @@ class Samples:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
+    """Uniform time grid: `count` instants, 1 / rate_hz apart, the first at start_s."""
+
     start_s: float
     rate_hz: float
     count: int

@@ -6,6 +6,8 @@ from html import escape
 
 @dataclass(frozen=True, slots=True)
 class Summary:
+    """Title and rows of a result, as plain text by `str` and as an HTML table by `html`."""
+
     title: str
     rows: tuple[tuple[str, str], ...]
     """What it is, and its value with its unit."""

@@ -14,6 +14,9 @@ FORCES = ("N", "N m")
 
 @dataclass(frozen=True, slots=True)
 class UnitSystem:
+    """Units of force, length and time, from which those of mass, damping and stiffness follow. Default: SI,
+    translational."""
+
     force: str = "N"
     """Unit of a command; ASCII."""
     length: str = "m"

@@ -16,6 +16,8 @@ Plain = str | int | float | bool | list[Any] | dict[str, str]
 
 @dataclass(frozen=True, slots=True)
 class ExplainedField:
+    """A field of a protocol: its value, its default, what it means, and which values are allowed."""
+
     key: str
     """Dotted path; entries of lists of tables count from 1: `staircase.steps[2].step_db`."""
     value: Plain

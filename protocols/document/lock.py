@@ -19,6 +19,8 @@ class LockError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class ProtocolLock:
+    """Name and hash of a protocol at the time when it was locked."""
+
     name: str
     hash: str
     """As `protocol_hash` gives it."""

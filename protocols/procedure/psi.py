@@ -54,6 +54,8 @@ def levels_db(cap_db: float) -> FloatArray:
 
 @cache
 def thresholds_db(cap_db: float) -> FloatArray:
+    """(thresholds,), ascending: thresholds of the grid in dB re 1 N, LEVEL_STEP_DB apart. cap_db: the cap in dB re 1
+    N."""
     levels = levels_db(cap_db)
     return np.arange(float(levels[0]) - BEYOND_DB, cap_db + BEYOND_DB + LEVEL_STEP_DB / 2, LEVEL_STEP_DB)
 
@@ -90,6 +92,8 @@ def next_level_db(probability: FloatArray, cap_db: float) -> float:
 
 
 def estimate(probability: FloatArray, cap_db: float) -> Estimate:
+    """Mean and standard deviation of the threshold's marginal posterior, and its probability above the cap.
+    probability: (thresholds, slopes), as `posterior` gives it."""
     thresholds, by_threshold = thresholds_db(cap_db), probability.sum(axis=1)
     mean = float((by_threshold * thresholds).sum())
     variance = float((by_threshold * (thresholds - mean) ** 2).sum())

@@ -55,6 +55,8 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Draw:
+    """Random choices for one presentation of a stimulus: its direction and its polarity."""
+
     direction: int
     """1 or 2 as in the protocol; `label_of` gives the number on the screen."""
     polarity: int

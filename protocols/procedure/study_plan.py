@@ -17,6 +17,8 @@ Progress = Literal["done", "begun", "left out"]
 
 @dataclass(frozen=True, slots=True)
 class Participant:
+    """A participant of a study: code, number in the balanced order, and progress."""
+
     code: str
     number: int | None
     """The place in the balanced order, from 0; None where none was taken."""
@@ -45,6 +47,9 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class StudyPlan:
+    """Participants of a study so far, and the cells of its balanced design with the participants that each still
+    needs."""
+
     protocol: str
     planned: int
     """The declared sample size; 0 where none is declared."""

@@ -7,6 +7,8 @@ from typing import Protocol
 
 
 class Clock(Protocol):
+    """Interface of the clock of a session: monotonic time, UTC and sleep."""
+
     @property
     def virtual(self) -> bool:
         """Whether time passes only by `sleep`."""
@@ -24,6 +26,8 @@ class Clock(Protocol):
 
 
 class RealClock:
+    """Clock of the system: `time.monotonic`, `time.sleep`, and UTC in milliseconds."""
+
     virtual = False
 
     def now_s(self) -> float:

@@ -19,6 +19,8 @@ from study.session.stimulus.limits import Limits
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
+    """Properties of an opened device: name, rate, maximum force and mass."""
+
     name: str
     simulated: bool
     sample_rate_hz: float

@@ -159,6 +159,8 @@ def address_of(function: Any) -> int:
 
 
 def system_calls(lock: SharedLock) -> Addresses:
+    """(SYSTEM_SIZE,): addresses of the functions for clock, sleep and lock, and of the lock itself, for compiled code.
+    CLOCK and SLEEP are 0 except on Linux with its usual monotonic clock."""
     calls = np.zeros(SYSTEM_SIZE, dtype=np.int64)
     calls[MONOTONIC] = address_of(_monotonic)
     if sys.platform == "linux" and time.get_clock_info("monotonic").implementation == "clock_gettime(CLOCK_MONOTONIC)":

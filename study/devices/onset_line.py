@@ -39,6 +39,8 @@ class Line(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Pulse:
+    """Result of a request for a trigger pulse."""
+
     line: str
     """Which line, in words."""
     at_s: float | None

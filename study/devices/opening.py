@@ -52,6 +52,7 @@ CALIBRATED = "simulated:"
 
 
 def needs_real_time(name: str) -> bool:
+    """Whether the device with this name runs in real time; simulated and replayed devices run in virtual time."""
     return name not in SIMULATIONS and not name.startswith((REPLAY, CALIBRATED))
 
 
@@ -220,6 +221,7 @@ def keep_accelerometer(table: str) -> Path:
 
 
 def lab_file_path() -> Path:
+    """Path of the lab's settings of its device; the file need not exist."""
     from study.devices.force_dimension.lab import lab_file
 
     return lab_file()

@@ -107,6 +107,7 @@ class SensesApart(Protocol):
 
 
 def no_buttons() -> frozenset[int]:
+    """Buttons pressed on a device that has none: always empty."""
     return frozenset()
 
 

@@ -53,6 +53,8 @@ def _abbreviate_list(parts: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Built:
+    """A recording built from imported files, in memory."""
+
     recording: Recording
     notes: tuple[str, ...]
     """Sentences: how signals were resampled, which clock was shifted, which samples are missing."""

@@ -24,6 +24,8 @@ MPS2_PER_N = ((5.0, 1.5), (15.0, 2.7), (25.0, 2.85), (35.0, 3.1), (45.0, 3.6))
 
 @dataclass(frozen=True, slots=True)
 class DeliveredFeeler:
+    """An `Observer` who answers to the measured acceleration, converted to an equivalent force for `feeler`."""
+
     name: str
     feeler: DirectionFeeler
     """Thresholds, slope, lapses and criterion."""

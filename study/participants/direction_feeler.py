@@ -25,6 +25,8 @@ _NORMAL = NormalDist()
 
 @dataclass(frozen=True, slots=True)
 class DirectionFeeler:
+    """An `Observer` with thresholds for the direction over frequency."""
+
     name: str
     thresholds_n: tuple[tuple[float, float], ...]
     """(frequency in Hz, level in N with 79.37 % of the directions right), frequencies ascending."""

@@ -26,6 +26,8 @@ from study.participants.psychometric_curve import WeibullCurve
 
 @dataclass(frozen=True, slots=True)
 class IntensityCue:
+    """An `Observer` who tells the two directions apart only by the strength of the vibration."""
+
     name: str
     difference_db: float = 3.0
     """Level of direction 1 as delivered, above that of direction 2."""

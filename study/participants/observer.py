@@ -29,6 +29,8 @@ class Felt:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
+    """Reply of a simulated participant to a presentation."""
+
     answer: int
     """1 or 2."""
     response_time_s: float

@@ -19,6 +19,8 @@ _NORMAL = NormalDist()
 
 @dataclass(frozen=True, slots=True)
 class UnsureRepeater:
+    """An `Observer` who asks for a repetition where the evidence is near the criterion."""
+
     name: str
     feeler: DirectionFeeler
     unsure: float = 0.5

@@ -46,6 +46,7 @@ def processor_s() -> float:
 
 
 def cores() -> int:
+    """Number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

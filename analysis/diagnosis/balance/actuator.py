@@ -71,6 +71,8 @@ class Actuator:
 
 @dataclass(frozen=True, slots=True)
 class DrivenAxis:
+    """An axis whose command is examined: its number, its kind, and what the command sets."""
+
     number: int
     rotational: bool
     target: int | None = None

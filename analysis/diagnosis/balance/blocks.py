@@ -36,6 +36,7 @@ class Block:
 
 
 def column_scale(rows: Sequence[FloatArray], fit: Sequence[Mask]) -> FloatArray:
+    """(k,): root mean square of each column over the masked samples of all motions; 1 where that is 0."""
     size = np.sqrt(np.mean(np.vstack([r[mask] for r, mask in zip(rows, fit, strict=True)]) ** 2, axis=0))
     return np.where(size > 0, size, 1.0)
 
@@ -43,6 +44,9 @@ def column_scale(rows: Sequence[FloatArray], fit: Sequence[Mask]) -> FloatArray:
 def blocks_of(
     rows: Sequence[FloatArray], aims: Sequence[FloatArray], masks: Sequence[Mask], units: tuple[FloatArray, float]
 ) -> tuple[Block, ...]:
+    """Blocks of the masked samples, about twice `BALANCE_FOLDS` in all, from columns divided by their scales. units:
+    scales (k,), and the mean about which `Block.signal` is taken. Of more than `BALANCE_MOST_SAMPLES` samples, only the
+    first part of each block is used."""
     scale, mean = units
     total = sum(int(mask.sum()) for mask in masks)
     found = []
@@ -58,6 +62,7 @@ def blocks_of(
 
 
 def block_products(block: Block, columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Gram matrix (k, k) and cross products (k,) of k chosen columns of a block."""
     at = list(columns)
     return block.gram[np.ix_(at, at)], block.pull[at]
 
@@ -71,6 +76,7 @@ def products_per_block(blocks: Sequence[Block], columns: Sequence[int]) -> tuple
 
 
 def summed_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Gram matrix (k, k) and cross products (k,) of k chosen columns, summed over the blocks."""
     grams, pulls = products_per_block(blocks, columns)
     return np.asarray(grams.sum(axis=0)), np.asarray(pulls.sum(axis=0))
 
@@ -111,6 +117,8 @@ def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[F
 
 
 def squared_error(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
+    """Residual sum of squares of given weights, at least 0. own: Gram matrix and cross products; power: sum of squares
+    of what is fitted."""
     gram, pull = own
     return max(power - 2 * float(weights @ pull) + float(weights @ gram @ weights), 0.0)
 

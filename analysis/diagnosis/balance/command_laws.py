@@ -38,6 +38,8 @@ BENDS = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommandLaw:
+    """A static nonlinearity of the actuator with fixed parameters: the force as a function of command and position."""
+
     effect: str
     """Name of the vocabulary, or a new one in the same style for physics that it lacks."""
     values: dict[str, float]

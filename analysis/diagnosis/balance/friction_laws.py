@@ -31,6 +31,8 @@ def friction_widths(of: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]
 
 
 def friction_laws(c: int, of: Scales) -> Iterator[Law]:
+    """Coulomb, Stribeck, presliding, asymmetric, drifting and position-dependent friction along channel c, with start
+    values on grids of its speed and travel."""
     sharp = SHARP * of.speed
     widths_of_sign, spans = friction_widths(of)
     for width in widths_of_sign:

@@ -72,6 +72,7 @@ def agrees_with_folds(held: Sequence[FloatArray], folds: Sequence[FloatArray]) -
 
 
 def bootstrap_draws(blocks: int) -> npt.NDArray[np.int64]:
+    """(`BOOTSTRAP_DRAWS`, blocks): indices of blocks drawn with replacement, always the same for a number of blocks."""
     return np.random.default_rng(BOOTSTRAP_SEED).integers(blocks, size=(BOOTSTRAP_DRAWS, blocks))
 
 

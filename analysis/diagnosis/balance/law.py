@@ -31,6 +31,9 @@ class Formula:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Law:
+    """A law as a term of a force balance: columns for given nonlinear parameters, and the parameters of the effect from
+    the fitted weights."""
+
     effect: str
     """Name of the vocabulary, or a new one in the same style for physics that it lacks."""
     channel: int
@@ -80,6 +83,7 @@ class Scales:
 
 
 def scales_of(motions: Sequence[Motion], channel: int, rotational: bool) -> Scales:
+    """Sizes of a channel's motion over the samples to fit of all motions: rms speed, travel and its ends, duration."""
     position = np.concatenate([each.position[each.fit, channel] for each in motions])
     velocity = np.concatenate([each.velocity[each.fit, channel] for each in motions])
     low, high = float(position.min()), float(position.max())
@@ -100,10 +104,12 @@ def smooth_sign(velocity: FloatArray, width: float) -> FloatArray:
 
 
 def name_weights(*names: str) -> Values:
+    """A `Values` that gives the weights these names, in their order, with either sign."""
     return lambda w, n, mass: dict(zip(names, map(float, w), strict=True))
 
 
 def name_positive_weight(name: str) -> Values:
+    """A `Values` for a single weight that is physical only where it is positive; else None."""
     return lambda w, n, mass: {name: float(w[0])} if w[0] > 0 else None
 
 

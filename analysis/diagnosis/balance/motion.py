@@ -219,10 +219,12 @@ def _derivative(
 
 
 def low_pass_filter(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
+    """(n, k): samples low-pass filtered to `band_hz` in the frequency domain, with the line between their ends kept."""
     return filter_spectrum(samples, rate_hz, lambda f: low_pass_gain(f, band_hz))
 
 
 def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, times: int) -> FloatArray:
+    """(n, k): time derivative of order `times`, within 0 to `band_hz`, computed in the frequency domain."""
     return _derivative(samples, rate_hz, (band_hz, 0.0), times, 0.0)
 
 

@@ -155,6 +155,7 @@ def regression_of(
 
 
 def signal_power(blocks: Sequence[Block]) -> float:
+    """Sum of squares of the force about its mean, over the blocks."""
     return sum(block.signal for block in blocks)
 
 

@@ -11,6 +11,8 @@ from equalizer.signals.signal import FloatArray
 
 
 def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
+    """Gravity torque, nonlinear springs, end stops and backlash along channel c, with start values on grids of its
+    travel. None but gravity torque for a shaft that turns more than twice."""
     if of.rotational and of.travel > LEAST_TRAVEL_RAD:
         yield Law(
             "gravity_torque", c, (), lambda m, _: np.hstack([np.sin(m.position[:, [c]]), np.cos(m.position[:, [c]])]),
@@ -49,6 +51,8 @@ def _stop_columns(c: int, side: float) -> Columns:
 
 
 def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
+    """Pose-dependent inertia, an extra mode on a grid of frequencies and damping ratios, and amplifier lag along
+    channel c."""
     if not of.turns:
         yield Law(
             "pose_dependent_inertia", c, (),

@@ -35,6 +35,8 @@ class Structure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StructureSearch:
+    """Result of the search for sums of laws: the linear structure, the best, and the best of each set of effects."""
+
     regression: Regression
     """The regression with the refined laws of the final structures."""
     linear: Structure

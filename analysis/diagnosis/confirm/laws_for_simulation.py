@@ -23,6 +23,8 @@ _PREFIX = {"q": "", "v": "v", "f": "f"}
 
 
 def can_be_played(own: int, judged: JudgedLaw) -> bool:
+    """Whether a simulation can use the law: it has a formula, or is an effect of the catalogue on its own axis with all
+    parameters in their bounds. own: channel of the axis."""
     if judged.formula is not None:
         return True
     effect = EFFECTS.get(judged.law.effect)

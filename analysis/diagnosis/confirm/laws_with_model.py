@@ -35,6 +35,8 @@ from equalizer.signals.recording import Recording
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResultBesideModel:
+    """A search's result after the decision by held-out gain, and the force balances that were used for it."""
+
     result: SearchResult
     balances: tuple[Balance, ...] = ()
     """Empty where nothing is missing, or no motion was measured."""

@@ -66,10 +66,13 @@ class AutoregressiveBase:
 
 
 def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
+    """(n / step, k): every `step`-th sample, low-pass filtered to 0.4 times the new rate before."""
     return samples if step == 1 else low_pass_filter(samples, rate_hz, 0.4 * rate_hz / step)[::step]
 
 
 def likely_step(parts: Sequence[Part]) -> int:
+    """Decimation step that keeps the band of the fastest response: the part of its spectrum with the share
+    `RESPONSE_BAND_SHARE` of the power above the noise."""
     ends = []
     for part in parts:
         moved = part.response - part.response.mean(axis=0)

@@ -55,6 +55,7 @@ def _detrended_mean_squares(part: Part) -> FloatArray:
 
 
 def is_rotational(recording: Recording) -> bool:
+    """Whether a response or command channel is an angle, its derivative or a torque, by its unit."""
     return any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))
 
 

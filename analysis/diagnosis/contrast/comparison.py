@@ -37,6 +37,9 @@ class JudgedFault:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
+    """All tested faults with their gains, beside the errors with nothing undone and between stretches of the same
+    set."""
+
     faults: tuple[JudgedFault, ...]
     """The best first."""
     plain: FloatArray

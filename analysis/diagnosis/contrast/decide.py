@@ -37,6 +37,8 @@ BEHIND = "another explains more of what sets these recordings apart"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Decision:
+    """The named fault with its class and probability, or None, and the candidates that are not named."""
+
     named: JudgedFault | None
     alike: tuple[str, ...]
     """Effects that fit as well in its place (class)."""

@@ -58,6 +58,8 @@ class Variant:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fault:
+    """A fault of the vocabulary at an axis or channel, with the variants that undo it."""
+
     effect: str
     """Name of the vocabulary, or a new one in the same style."""
     place: Place

@@ -93,6 +93,8 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
+    """Fitted sizes of a fault, and the errors of the base with the fault undone by these sizes."""
+
     sizes: FloatArray
     errors: FloatArray
     """(blocks with, then without): white sums of squares, over all streams."""

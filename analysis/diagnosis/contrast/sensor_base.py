@@ -18,6 +18,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorBase:
+    """A channel of the response predicted from the same channel of the position, differentiated and filtered."""
+
     channel: int
     times: int
     """Derivatives between the two."""

@@ -34,6 +34,8 @@ class SignalFault:
 
 
 def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
+    """Mains hum that is in the faulty parts alone, with the amplitude and frequency of its strongest channel; None
+    without."""
     found = [
         (*mains_line, channel)
         for channel in range(faulty[0].response.shape[1])

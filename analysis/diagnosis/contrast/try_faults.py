@@ -19,6 +19,8 @@ Tried = tuple[Fit, Fault, Variant, list[Pair]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
+    """Result of trying faults: each with its best variant and size, beside the products with nothing undone."""
+
     bare: list[Pair]
     """Per base, the products of both sets with nothing undone."""
     tried: list[Tried]
@@ -28,6 +30,7 @@ class Trial:
 
 
 def try_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Trial:
+    """Tries every fault on all streams, in order, until the time runs out."""
     clean = [stream.grams(stream.clean, []).blocks for stream in streams]
     bare = [
         Pair(stream.grams(stream.other, []), ALL, tuple(own), (stream.clean.scale / stream.other.scale) ** 2)
@@ -94,4 +97,5 @@ def _at_allowed_size(found: Tried) -> Tried:
 
 
 def allowed_sizes(variant: Variant) -> Variant:
+    """The variant, with its size fixed at 1 where it is a fault at size 1 only."""
     return fix_size(variant, 0.0) if variant.exact else variant

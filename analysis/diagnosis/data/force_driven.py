@@ -35,4 +35,5 @@ def as_force_driven(recording: Recording) -> Recording:
 
 
 def all_as_force_driven(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Each recording in the form of `as_force_driven`."""
     return tuple(as_force_driven(recording) for recording in recordings)

@@ -16,6 +16,8 @@ FREE = "free"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredMotion:
+    """Positions of the driven axes, as measured or integrated from velocities, and their noise."""
+
     position: FloatArray
     """(n, m), finite: positions of the model's first m outputs."""
     noise: FloatArray

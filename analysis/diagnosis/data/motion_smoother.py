@@ -80,6 +80,8 @@ def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its p
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SmoothedMotion:
+    """States and missing force, estimated by the smoother at each sample."""
+
     states: FloatArray
     """(n, 2 coordinates): positions, then velocities, just before each command is written."""
     axis_position: FloatArray

@@ -16,6 +16,8 @@ ADDED_MASS, ADDED_INERTIA = "added_mass_kg", "added_inertia_kg_m2"
 
 
 def add_carried_weight(model: MechanicalModel, recording: Recording) -> MechanicalModel:
+    """The model with the mass or inertia that the recording's `meta` says the device carried along every driven
+    axis."""
     added = recording.meta.get(_key(model), 0.0)
     return add_mass(model, float(added)) if added else model
 

@@ -26,6 +26,8 @@ _LACKING = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RankedSums:
+    """Sums of terms ranked by their held-out error, and what chance alone explains."""
+
     sums: tuple[Sum, ...]
     """The best first."""
     placebo: float

@@ -62,6 +62,8 @@ class Round:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Discovery:
+    """Result of the search for discovered laws: the fits, and the rounds that led to them."""
+
     found: Explanation
     """`after` holds the laws; its rounds and steps are those of the laws."""
     rounds: tuple[Round, ...]

@@ -25,6 +25,8 @@ _CONVERGED = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sum:
+    """A fitted sum of terms on an axis or a reading, with its cross-validated error."""
+
     axis: int
     """Driven axis, or channel of the response."""
     terms: tuple[Term, ...]

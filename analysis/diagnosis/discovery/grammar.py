@@ -22,6 +22,9 @@ _SIGNAL = re.compile(rf"\b(?:[vfa]?[{AXES}]|t)\b")
 
 @dataclass(frozen=True, slots=True)
 class Term:
+    """A term of a discovered law: a formula with free numbers, where they start, and their bounds; its factor is fitted
+    apart."""
+
     shape: str
     """Formula in the language of laws; its free numbers are p0, p1, …"""
     numbers: tuple[float, ...] = ()
@@ -40,10 +43,12 @@ class Term:
 
 
 def odd_power(name: str, number: int) -> str:
+    """Formula of an odd power of a signal, abs(x)^p sign(x). number: index of the free exponent."""
     return f"abs({name})**p{number}*sign({name})"
 
 
 def even_power(name: str, number: int) -> str:
+    """Formula of an even power of a signal, abs(x)^p. number: index of the free exponent."""
     return f"abs({name})**p{number}"
 
 
@@ -64,6 +69,8 @@ class Axis:
 
 
 def axes_of(columns: Columns, count: int) -> tuple[Axis, ...]:
+    """The first `count` axes with the largest magnitudes of their position, velocity and force."""
+
     def largest(name: str) -> float:
         return max(float(np.abs(columns[name]).max()), 1e-12)
 

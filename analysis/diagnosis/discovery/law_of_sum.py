@@ -48,6 +48,7 @@ def _renumber(shape: str, first: int) -> str:
 
 
 def hypothesis_of_sum(of: Sum, recording: Recording) -> Hypothesis:
+    """The sum as a hypothesis to simulate; a partner on another axis adds a claim of its own."""
     own = hypothesis_of_law(law_of_sum(of, recording), of.axis, recording)
     return own if of.partner is None else combine(own, hypothesis_of_sum(of.partner, recording))
 

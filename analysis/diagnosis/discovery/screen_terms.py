@@ -103,6 +103,8 @@ def add_columns(base: Products, columns: Sequence[FloatArray]) -> Products:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TermErrors:
+    """Cross-validated squares of the base alone and with each term beside it, block by block."""
+
     without: FloatArray
     """(blocks,): held-out squares of the base alone."""
     with_it: FloatArray
@@ -179,6 +181,8 @@ def _held_out_squares(of: Products, number: int, weights: FloatArray) -> FloatAr
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
+    """Weights of the base columns, fitted to all blocks together, and their cost."""
+
     weights: FloatArray
     """(k,)"""
     cost: float

@@ -42,6 +42,8 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class BandPower:
+    """Band powers of the signals of an error measure, measured and predicted, by stretch, band and channel."""
+
     measure: ErrorMeasure
 
     @cached_property

@@ -39,6 +39,8 @@ PERTURBATION = 1e-9
 
 
 def perturb(hypothesis: Hypothesis, number: int) -> Hypothesis:
+    """The hypothesis with its parameters moved by `number` times `PERTURBATION`, for a further simulation of chaotic
+    impacts."""
     return replace(hypothesis, point=hypothesis.point + number * PERTURBATION)
 
 
@@ -98,6 +100,8 @@ class BandPowerFit:
 
 
 def evaluate_hypothesis(view: View, deviations: FloatArray, hypothesis: Hypothesis) -> BandPowerFit:
+    """Predicted band powers and their robust cost (Huber) at given numbers, without fitting; infinite where a
+    prediction is not finite."""
     predicted = view.predict(deviations, hypothesis)
     weights = view.weights
     if not np.isfinite(predicted[weights > 0]).all():

@@ -47,6 +47,8 @@ NO_STATE = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chosen:
+    """The chosen error measure with the noise of its signals, and remarks for the user."""
+
     measure: ErrorMeasure
     floors: tuple[NoiseFloor, ...]
     """Noise of the compared signals, per record of the measure."""

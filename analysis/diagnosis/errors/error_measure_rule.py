@@ -68,6 +68,8 @@ NOT_AT_REST = (
 
 @dataclass(frozen=True, slots=True)
 class Choice:
+    """The error measure that the rule chooses, and why."""
+
     measure: Measure
     why: str
     """A sentence for the user; empty for a free simulation."""

@@ -108,6 +108,7 @@ def has_motion_forces(hypothesis: Hypothesis) -> bool:
 
 
 def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
+    """The hypothesis without its claim of that number, and without the claim's starts and parameters."""
     first = sum(claim.groups for claim in whole.claims[:number])
     last = first + whole.claims[number].groups
     sizes = [sum(not p.fixed for p in claim.effect.parameters) * claim.groups for claim in whole.claims]
@@ -127,6 +128,7 @@ def hypothesis_of_claim(claim: Claim, values: Sequence[Values]) -> Hypothesis:
 
 
 def combine(first: Hypothesis, other: Hypothesis) -> Hypothesis:
+    """A hypothesis with the claims of both; those of the first come first."""
     return Hypothesis(
         first.claims + other.claims, first.starts + other.starts, np.concatenate([first.point, other.point])
     )

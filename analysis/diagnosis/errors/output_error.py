@@ -91,6 +91,8 @@ class Sensitivity:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
+    """A hypothesis and the model's own parameters at a point of the fit, with the residuals and the cost there."""
+
     hypothesis: Hypothesis
     deviations: FloatArray
     """(t,): deviations of the model's own parameters, in standard deviations of the calibration."""
@@ -166,6 +168,7 @@ def expected_gain(gained: float, before: float) -> float:
 
 
 def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
+    """Residuals and cost of a hypothesis at given deviations, by simulation without fitting."""
     residuals = measure.residuals(tuning.tune(deviations), hypothesis.placed_effects())
     return Fitted(hypothesis, deviations, residuals, _cost(residuals_to_fit(measure, residuals), deviations))
 

@@ -23,6 +23,8 @@ FLAT = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WhiteningFilter:
+    """A causal FIR filter per channel, which makes the reference residual white."""
+
     steps: FloatArray
     """(lags + 1, c): the whitening filter, the first row 1."""
 

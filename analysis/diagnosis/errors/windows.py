@@ -176,6 +176,7 @@ def windows_of(
 
 
 def samples_of(window_s: float, sample_rate_hz: float) -> int:
+    """Length of a window in samples, at least 1."""
     return max(round(window_s * sample_rate_hz), 1)
 
 

@@ -34,6 +34,8 @@ SHAPES: dict[str, Callable[[Motion], FloatArray]] = {
 
 @dataclass(frozen=True, slots=True)
 class TriedStructure:
+    """A structure that was tried, with its held-out error or the reason for its refusal."""
+
     kind: Kind
     error: float | None
     """Root-mean-square error relative to the signal; None where it was refused."""
@@ -42,6 +44,8 @@ class TriedStructure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Choice:
+    """The chosen structure, all that were tried, why it was chosen, and a sentence on the error that remains."""
+
     fit: StructureFit
     tried: tuple[TriedStructure, ...]
     reason: str

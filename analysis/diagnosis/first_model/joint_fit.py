@@ -24,6 +24,8 @@ PARTS: tuple[Part, ...] = ("mass", "damping", "stiffness")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointFit:
+    """Symmetric mass, damping and stiffness matrices fitted together, with their intervals and held-out errors."""
+
     matrices: dict[Part, FloatArray]
     """(d, d) each; zero where a part was not asked for."""
     halves: dict[Part, FloatArray]
@@ -52,6 +54,7 @@ class _Parametrisation:
 
 
 def regressions_of(motions: Sequence[Motion], turns: bool) -> tuple[Regression, ...]:
+    """Regression of the force of each axis on mass, damping and stiffness alone, without laws. turns: see `Scales`."""
     return tuple(regression_of(motions, axis, (), turns) for axis in range(motions[0].force.shape[1]))
 
 

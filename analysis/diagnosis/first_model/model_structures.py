@@ -42,6 +42,8 @@ class StructureRefused(ValueError):  # noqa: N818 - an answer that a user reads
 
 @dataclass(frozen=True, slots=True)
 class Number:
+    """A number of a fitted model with its confidence interval."""
+
     name: str
     unit: str
     value: float
@@ -51,6 +53,8 @@ class Number:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StructureFit:
+    """A structure fitted to recordings: the model, its numbers and its held-out errors."""
+
     kind: Kind
     model: MechanicalModel
     numbers: tuple[Number, ...]

@@ -31,6 +31,8 @@ ASSUMED_NOISE = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceViews:
+    """The error measure by predicted forces with the noise of its forces."""
+
     measure: PredictedForce
     floors: tuple[NoiseFloor, ...]
     """Noise of the views, per record."""

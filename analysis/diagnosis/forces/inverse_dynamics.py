@@ -40,6 +40,8 @@ class BandMotion:
 
 
 def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> BandMotion:
+    """Position, velocity and acceleration below `band_hz`, at the samples and as means about them. position: (n, m),
+    finite."""
     m = position.shape[1]
 
     def gain(frequency_hz: FloatArray) -> ComplexArray:

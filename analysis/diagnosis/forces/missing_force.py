@@ -24,6 +24,8 @@ _SETTLING_S = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MissingForce:
+    """Estimated missing force along m driven axes, and the motion that it causes."""
+
     force: FloatArray
     """(n, m), N"""
     position: FloatArray

@@ -54,6 +54,7 @@ def shuffle_blocks(strata: IntArray, block: int, random: np.random.Generator) ->
 
 
 def block_length(series: FloatArray) -> int:
+    """Length of a block in samples: three correlation times of the series (n,), at least 1."""
     return max(1, round(_MEMORIES * correlation_time(series)))
 
 

@@ -60,6 +60,8 @@ class Distortion:
 
 @dataclass(frozen=True, slots=True)
 class Distortions:
+    """Distortion by cell, and sentences on the kinds that the recording cannot show."""
+
     cells: tuple[Distortion, ...]
     remarks: tuple[str, ...]
 

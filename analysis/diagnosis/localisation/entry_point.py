@@ -37,6 +37,8 @@ _TINY = np.finfo(np.float64).tiny
 # A mismatch of the response without one of the position belongs to the response sensor: a force would move both.
 @dataclass(frozen=True, slots=True)
 class SensorRule:
+    """Comparison of the position's residual with the motion that the response's residual would mean if it were real."""
+
     verdict: Literal["response sensor", "motion", "undecided"]
     expected: float
     """Power of the position that corresponds to the response's residual, if it were real motion, in units of the
@@ -69,6 +71,8 @@ def sensor_rule(spectra: ResidualSpectra, derivative: int) -> SensorRule | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entry:
+    """A component through which a mismatch may enter, and how the channels respond to inputs there."""
+
     name: str
     place: Place
     axis: str | None
@@ -81,6 +85,8 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class EntryScore:
+    """An entry with its score and its test against the best entry."""
+
     name: str
     place: Place
     axis: str | None
@@ -96,6 +102,8 @@ class EntryScore:
 
 @dataclass(frozen=True, slots=True)
 class EntryPoint:
+    """All entries ranked by what they leave unexplained, and the comparison of position and response."""
+
     ranking: tuple[EntryScore, ...]
     """Entries, best first."""
     rule: SensorRule | None

@@ -19,6 +19,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class LevelTrend:
+    """Distortion of a kind in an output, by input and band, and how it changes with the level."""
+
     output: str
     quantity: str
     input: str
@@ -52,6 +54,7 @@ class LevelTrend:
 
 
 def level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
+    """Trends of all outputs, inputs, bands and kinds. cells: distortions at all levels."""
     groups: dict[tuple[str, str, str, Band, bool, Kind], list[Distortion]] = {}
     for cell in cells:
         # Realisations differ slightly in the band that they drive.

@@ -31,6 +31,8 @@ _DERIVATIVES: Mapping[str, Literal[0, 1, 2]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Localisation:
+    """Where a mismatch is: the states that it goes with, the component of entry, and the kinds of distortion."""
+
     states: Mapping[str, tuple[StateMismatch, ...]] = field(default_factory=dict)
     """Significant state dependences, by "before", "retuned", "after"."""
     entry: EntryPoint | None = None

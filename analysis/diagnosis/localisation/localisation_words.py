@@ -38,6 +38,7 @@ def entry_sentence(entry: EntryPoint | None) -> str:
 
 
 def states_sentence(states: Sequence[StateMismatch]) -> str:
+    """Sentence on the states that the mismatch goes with; empty where there are none."""
     if not states:
         return ""
     parts = [

@@ -43,6 +43,8 @@ class Margin:
 
 @dataclass(frozen=True, slots=True)
 class MismatchCell:
+    """The mismatch in a cell of output, driving input, octave and level, with its test."""
+
     output: str
     quantity: str
     """Quantity of the output: response and position channels may share a name."""

@@ -23,6 +23,8 @@ STRETCHES = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Maps:
+    """Mismatch cells of the given, the re-tuned and the completed model."""
+
     cells: Mapping[str, Cells]
     """The map of each stage; keys "before", "retuned", "after"."""
 

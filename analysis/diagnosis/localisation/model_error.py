@@ -30,6 +30,8 @@ class _HeldOutShare:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelError:
+    """Held-out mismatch as shares of the signal, from which the usual error near a cell follows."""
+
     held: Mapping[tuple[str, str], tuple[_HeldOutShare, ...]]
     """Held-out shares by (channel, quantity)."""
 

@@ -75,6 +75,7 @@ def segment_spectra(
 
 
 def inputs_of(recording: Recording, periods: Periods) -> str:
+    """Names of the inputs that are driven in the first of the periods, joined by "+"."""
     there = slice(periods.starts[0], periods.starts[0] + periods.length)
     return "+".join(find_driven_inputs(instrument_signal(recording)[there].var(axis=0), recording.command.channels))
 

@@ -28,6 +28,8 @@ _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
+    """A state variable over all samples, such as speed or position, on which a residual may depend."""
+
     kind: StateKind
     symbol: str
     """Symbol in the result: "v", "x", "fx", "ax", "t"."""
@@ -52,6 +54,8 @@ class Disturbance:
 
 @dataclass(frozen=True, slots=True)
 class StateRegion:
+    """A region of a state variable in which the residual is large, or whose sign it follows, with the p-value."""
+
     kind: StateKind
     symbol: str
     by: Literal["size", "sign"]

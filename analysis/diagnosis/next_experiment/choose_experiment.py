@@ -46,6 +46,8 @@ class Bench:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedGain:
+    """What an experiment would tell between the named effect and a rival."""
+
     experiment: Experiment
     gain: float
     """Expected log likelihood ratio in favour of the true effect; 0 where a simulation diverged."""
@@ -63,6 +65,8 @@ def predict_gains(
 
 @dataclass(frozen=True, slots=True)
 class ExperimentSet:
+    """The experiments to make next and the rivals that they discriminate; empty where none would."""
+
     experiments: tuple[Experiment, ...]
     told: tuple[int, ...]
     """Which rivals they discriminate from what is named, by their place."""

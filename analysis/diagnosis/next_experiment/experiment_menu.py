@@ -26,6 +26,8 @@ _FADE = 1 / 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
+    """A recording that could be made next: its commands, its words for the user, and its cost."""
+
     words: str
     """What to record; ends the sentence "record …"."""
     commands: FloatArray

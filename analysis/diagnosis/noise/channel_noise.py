@@ -23,6 +23,8 @@ class SegmentNoise:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelNoise:
+    """Size, spectrum and uncertainty of the noise of each channel of a signal."""
+
     rms: FloatArray
     """(channels,): rms of the noise, without the mean; NaN where unknown."""
     density: FloatArray

@@ -20,6 +20,8 @@ _LINES = 511
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NoiseFloor:
+    """Noise of a recording's response and position, and the method by which it was estimated."""
+
     how: How
     frequency_hz: FloatArray
     """(lines,)"""

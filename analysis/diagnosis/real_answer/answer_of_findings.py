@@ -83,6 +83,7 @@ def named_sentences(found: Findings) -> tuple[str, ...]:
 
 
 def model_sentence(found: Findings) -> str:
+    """Sentence on the given model: its name, numbers of coordinates, commands and responses, and quantity."""
     given = found.given
     bodies = "one body" if given.coordinates == 1 else f"{given.coordinates} bodies or modes"
     driven = "one command" if given.inputs == 1 else f"{given.inputs} commands"
@@ -91,6 +92,8 @@ def model_sentence(found: Findings) -> str:
 
 
 def held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutStretch, ...]:
+    """Each held-out stretch by channel, with its times in s and three rms values: of the signal about its mean, and of
+    the errors of the re-tuned and the completed model. Stretches without finite values are left out."""
     found = []
     for series in time_series:
         for start, stop in series.tested:
@@ -115,6 +118,8 @@ DRAWN = 900
 
 
 def drawn_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:
+    """At most `DRAWN` held-out samples of a channel, about where the completed model departs most from the re-tuned
+    model; None without held-out data."""
     stretches = [(series, *ends) for series in time_series for ends in series.tested]
     if not stretches:
         return None

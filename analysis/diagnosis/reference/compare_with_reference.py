@@ -87,6 +87,8 @@ class Contrast:
 def contrast_of(
     recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
 ) -> Contrast:
+    """The difference between recordings and clean ones: first a fault that readings, a spectrum or steps show directly,
+    else the comparison of all faults by base models. without: effects that are not considered."""
     effects = [effect for effect in CATALOGUE if effect.name not in without]
     shown = find_sensor_faults(recordings, clean, effects)
     if shown:
@@ -103,6 +105,7 @@ def contrast_of(
 
 
 def predicts_clean(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
+    """Whether the model as it is predicts every clean recording with an error of at most `FORESEEN`."""
     errors = [prediction_error(recording, model, "all").as_it_is for recording in clean]
     return all(error is not None and error <= FORESEEN for error in errors)
 

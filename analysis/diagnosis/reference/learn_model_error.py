@@ -50,6 +50,8 @@ class _Lesson:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LearnedError:
+    """A model's error on clean recordings: its size by cell, its spectrum as a whitening filter, and the recordings."""
+
     floor: CleanFloor
     whitening: WhiteningFilter
     share: FloatArray

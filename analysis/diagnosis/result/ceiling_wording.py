@@ -13,6 +13,8 @@ SAME = 1e-9
 
 
 def black_box_sentence(box: BlackBox | None, named: bool) -> str:
+    """Sentence that compares held-out errors of a black box and of the physics; empty without a black box. named:
+    whether effects were named; else the physics is the re-tuned model."""
     if box is None:
         return ""
     physics = "the physics" if named else "the re-tuned model"
@@ -26,6 +28,7 @@ def black_box_sentence(box: BlackBox | None, named: bool) -> str:
 
 
 def black_box_beats(box: BlackBox) -> bool:
+    """Whether the held-out error of the black box is smaller by more than the factor `SAME_TO_READERS`."""
     return box.test * SAME_TO_READERS < box.physics
 
 
@@ -76,6 +79,7 @@ def fall_text(errors: Errors, first: tuple[str, str], last: tuple[str, str], how
 
 
 def one_error(text: str, error: float | None, errors: Errors, how: str = "") -> str:
+    """Clause on a single held-out error beside the noise, or that it is not known. text: begins the clause."""
     if error is None:
         return "its error on held-out data is not known"
     return f"{text}, its error on held-out data is {error_of_signal(error)}{_noise(errors, error, how)}"

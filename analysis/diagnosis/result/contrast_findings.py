@@ -36,6 +36,8 @@ BY_ITSELF = "This is seen in the readings themselves, and not in those of the cl
 
 
 def add_contrast(whole: Findings, found: Contrast, recording: Recording, beyond: float) -> Findings:
+    """The findings with the result of a comparison with clean recordings in their diagnosis, model and remarks. beyond:
+    factor on the usual gain from which a fault counts."""
     if found.comparison is None or found.decision is None:
         named = _directly_shown_fault(found, recording)
         if named is None:

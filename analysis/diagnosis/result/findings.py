@@ -168,6 +168,7 @@ class Findings(Summarised):
 
 
 def effect_text(effect: NamedEffect) -> str:
+    """The effect's name and axis, and its parameters with units, in a line, each value to four significant digits."""
     numbers = ", ".join(
         f"{name} {each.value:.4g} {'' if each.unit == '1' else each.unit}".strip()
         for name, each in effect.parameters.items()

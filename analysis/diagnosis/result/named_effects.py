@@ -49,6 +49,8 @@ class Labels:
 
 
 def labels_of(recording: Recording, model: MechanicalModel) -> Labels:
+    """Channels of the command and the response, unit of the first response channel, and unit system and quantity of the
+    model."""
     unit = recording.response.unit
     return Labels(
         recording.command.channels,
@@ -171,6 +173,8 @@ def _units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
 
 
 def law_of_claim(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:
+    """The discovered law of a claim, with its fitted numbers, as the document writes it; None for an effect of the
+    catalogue. axis: replaces that of the law."""
     law = whole.claims[number].effect.law
     if law is None:
         return None

@@ -20,6 +20,7 @@ _LOSSES = 1e-6
 
 
 def implausible_sentences(found: Findings) -> tuple[str, ...]:
+    """Sentences on implausible parameters of the effects, on their intervals, and on the improved model."""
     return (
         *(sentence for placed in found.named for sentence in _of_effect(placed, found)),
         *(sentence for effect in found.diagnosis.effects for sentence in _of_interval(effect, found.named)),

@@ -30,6 +30,8 @@ WHERE = "the look at where it sits"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Examination:
+    """What is computed from the fits after a search: evidence, localisation, signatures and a black box."""
+
     evidence: tuple[Evidence, ...]
     """Evidence of the re-tuned model."""
     local: Localisation

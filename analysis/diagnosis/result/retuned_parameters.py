@@ -16,6 +16,8 @@ _LISTED = 4
 
 @dataclass(frozen=True, slots=True)
 class MovedNumber:
+    """A parameter of the model that a fit moved, with its change."""
+
     name: str
     change: float
     """Change of the parameter, in `unit`."""
@@ -105,6 +107,8 @@ def better_model(errors: Errors) -> tuple[str, str]:
 
 
 def better_alone(errors: Errors) -> tuple[str, float | None]:
+    """Words for the better of the given and the re-tuned model, and its error: the given model only where re-tuning
+    raises the error."""
     return ("as given", errors.before) if _retuning_raises_error(errors) else ("re-tuned", errors.retuned)
 
 

@@ -100,6 +100,7 @@ def answer_of(found: Findings) -> str:
 
 
 def device_of(found: Findings) -> Device:
+    """The facts about the device that sentences need, from the given model and the noise floor."""
     return Device(found.given.inputs == 1, found.given.system, "" if found.floor is None else found.floor.how)
 
 
@@ -164,6 +165,8 @@ def place_of(mismatch: Mismatch, device: Device | None = None) -> str:
 
 
 def next_experiment_sentence(diagnosis: Diagnosis) -> str:
+    """Sentences on the recording to make next and why; where none is foreseen, empty or, with rivals that cannot be
+    told apart, a sentence that says so."""
     wanted = diagnosis.next_experiment
     if wanted is None:
         alike = any(rival.inseparable for effect in diagnosis.effects for rival in effect.rivals)
@@ -175,6 +178,7 @@ def next_experiment_sentence(diagnosis: Diagnosis) -> str:
 
 
 def share_sentence(effect: NamedEffect) -> str:
+    """Sentence on an effect's share of the mismatch after re-tuning, the probability of its name, and its gain."""
     return (
         f"It accounts for {100 * effect.share:.3g} % of the mismatch that re-tuning leaves; "
         f"the probability that this is its name is {probability_text(effect.probability)}.{gain_sentence(effect)}"

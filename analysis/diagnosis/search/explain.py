@@ -77,6 +77,8 @@ class Statistic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explanation:
+    """Result of forward selection: the fits before, re-tuned and with effects, and the candidates of each round."""
+
     before: FittedCandidate
     """The model as given."""
     retuned: FittedCandidate

@@ -20,6 +20,8 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class Crash:
+    """A crash that was caught: what crashed, at what work, and the error's class and message."""
+
     what: str
     """An effect's name, or what else was tried, in words."""
     doing: str
@@ -40,6 +42,8 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Guard:
+    """Runs work so that a crash is noted and its result left out or replaced; when off, crashes are errors."""
+
     on: bool = False
     crashes: list[Crash] = field(default_factory=list)
     """Crashes caught so far."""

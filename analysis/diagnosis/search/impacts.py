@@ -211,6 +211,8 @@ def _rms_over_channels(times: FloatArray) -> float:
 
 # A response is irregular where repeats differ by far more than the noise or, without repeats, its residual is peaked.
 def is_irregular(context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
+    """Whether a response is irregular, as of rattling play: its periods vary by far more than the noise or, without
+    repeats, a channel's residual has a kurtosis above `PEAKED_KURTOSIS`."""
     if any(floor.how == "repeats" for floor in floors):
         return any(_varies(channel) for floor in floors for channel in (floor.response, floor.position) if channel)
     masks = [record.fit | record.choose for record in context.whole.records]

@@ -24,6 +24,8 @@ SETTLED = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceRecording:
+    """A clean recording with the model re-tuned to it, on which hypotheses are fitted for comparison."""
+
     measure: ColouredMeasure
     tuning: Tuning
     base: Fitted
@@ -64,6 +66,8 @@ class ReferenceRecording:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceRecordings:
+    """All clean recordings of a search; a hypothesis's gain on them counts against its gain elsewhere."""
+
     each: tuple[ReferenceRecording, ...]
     beyond: float
     """Factor on the largest gain of the reference recordings, which a gain must exceed: the fewer, the larger."""

@@ -15,6 +15,8 @@ from analysis.diagnosis.types import Mapper
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScreenedHypothesis:
+    """A hypothesis with the cost that the linear model predicts for its fit."""
+
     hypothesis: Hypothesis
     """Together with what is already held to be true."""
     cost: float

@@ -120,6 +120,8 @@ class Unconfirmed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchResult:
+    """Result of a search: the fits, the verdict, and candidates that are not named."""
+
     context: SearchContext
     """The search's shared state, with the roles of samples as used in the end."""
     found: Explanation

@@ -34,6 +34,8 @@ SENSED_SHARE = 0.06
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedCandidate:
+    """A fitted hypothesis with its errors on the samples to fit, to choose by and to test."""
+
     fitted: Fitted
     score: FitScore
     usual: float = 0.0

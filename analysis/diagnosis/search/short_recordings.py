@@ -63,6 +63,8 @@ class _Cut:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShortRecordings:
+    """A search context on the kept samples alone, and how these map to the samples of the whole recordings."""
+
     context: SearchContext
     """Context whose measure holds the kept samples alone: the samples to fit are also those to choose by."""
     kept: tuple[np.ndarray, ...]

@@ -17,6 +17,7 @@ class OutOfTimeError(Exception):
 
 
 def always() -> bool:
+    """A `TimeBudget` without a limit."""
     return True
 
 

@@ -28,6 +28,8 @@ from analysis.diagnosis.settings import (
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
+    """The verdict of a search, and whether its effects may be named."""
+
     verdict: Verdict
     named: bool
     """The effects of `Explanation.after` are to be named."""

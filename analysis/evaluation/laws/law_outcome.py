@@ -14,6 +14,8 @@ CLOSE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class TrueLaw:
+    """The law that was concealed in a case: formula, axes, numbers, and all forms of it that count as right."""
+
     law: str
     formula: str
     axes: tuple[str, ...]
@@ -27,6 +29,8 @@ class TrueLaw:
 
 @dataclass(frozen=True, slots=True)
 class LawOutcome:
+    """A case of a bank of laws: what was concealed, the diagnosis, and its errors."""
+
     number: int
     seed: int
     kind: str

@@ -11,11 +11,15 @@ from analysis.evaluation.proof.share import Figure, share, statistic
 
 @dataclass(frozen=True, slots=True)
 class LawScore:
+    """Figures of a bank of laws with their intervals, and the outcomes that count as misses."""
+
     figures: tuple[Figure, ...]
     misses: tuple[LawOutcome, ...]
 
 
 def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
+    """Score of a bank: rates over cases with a law, with nothing missing and with decoys, and median processor
+    seconds."""
     laws = [each for each in outcomes if each.truth is not None]
     shown = [each for each in laws if each.shows]
     nulls = [each for each in outcomes if each.kind == "nothing"]

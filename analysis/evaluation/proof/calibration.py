@@ -19,6 +19,8 @@ ANSWERABLE = ("nothing", "single", "pair")
 
 @dataclass(frozen=True, slots=True)
 class Bin:
+    """A bin of names with similar stated probabilities, and the share of these names that are right."""
+
     stated: float
     """Mean probability of its names."""
     right: float
@@ -30,6 +32,9 @@ class Bin:
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
+    """Expected calibration error of stated probabilities with its 95 % interval, and the bins of the reliability
+    curve."""
+
     error: float | None
     """Expected calibration error; None where nothing was named."""
     low: float | None

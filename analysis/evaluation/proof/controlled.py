@@ -13,6 +13,8 @@ SAME_NUMBER = 0.02
 
 @dataclass(frozen=True, slots=True)
 class ControlOutcome:
+    """A control's claim, whether it held, and the answers by which that was judged."""
+
     name: str
     claim: str
     held: bool

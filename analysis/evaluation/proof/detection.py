@@ -16,6 +16,8 @@ LEAST_DRAWS = 3
 
 @dataclass(frozen=True, slots=True)
 class Strip:
+    """All draws of an effect with their outcomes by strength, and the strength from which an oracle detects it."""
+
     effect: str
     draws: tuple[tuple[float, str], ...]
     """Strength (0 to 1) and outcome: right, in the set, missed or invisible; weakest first."""
@@ -25,6 +27,8 @@ class Strip:
 
 @dataclass(frozen=True, slots=True)
 class Part:
+    """Detection rate of a group of effects of similar size, with Wilson's 95 % interval."""
+
     adds: float
     """Median of its draws: what the effect changes of the readings, in units of the noise."""
     right: float
@@ -34,6 +38,7 @@ class Part:
 
 
 def detection_strips(singles: Sequence[Outcome]) -> tuple[Strip, ...]:
+    """A strip per effect, by name. singles: outcomes with a single concealed effect."""
     names = sorted({single.names[0] for single in singles})
     found = []
     for name in names:
@@ -57,6 +62,8 @@ def oracle_threshold(draws: Sequence[Outcome]) -> float | None:
 
 
 def classify_outcome(outcome: Outcome) -> str:
+    """Class of an outcome with a concealed effect: "right", "in the set" (returned, but not right), "missed", or
+    "invisible" (missed where it was not detectable)."""
     if outcome.right:
         return "right"
     if outcome.names[0] in outcome.returned:

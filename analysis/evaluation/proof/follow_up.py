@@ -34,6 +34,8 @@ class FollowUp:
 
 
 def follow_up_figures(found: Sequence[FollowUp]) -> tuple[Figure, ...]:
+    """Shares of ambiguous answers that a further recording resolved, proposed or random: of all, and of those with a
+    proposal."""
     asked = [each for each in found if each.proposed]
     return (
         share("several names, the right one left by the proposed recording", found, lambda each: each.resolved),

@@ -15,6 +15,8 @@ JUDGED: tuple[Judged, ...] = get_args(Judged)
 
 @dataclass(frozen=True, slots=True)
 class InjectedOutcome:
+    """A case of injected faults: what was injected, by how much it shows, and what the diagnosis said."""
+
     recording: str
     effects: tuple[str, ...]
     """Injected faults; none, or two where two were injected at once."""

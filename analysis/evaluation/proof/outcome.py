@@ -13,6 +13,8 @@ effect counts as detectable."""
 
 @dataclass(frozen=True, slots=True)
 class Concealed:
+    """An effect that was concealed in a case, with its place and true parameters."""
+
     effect: str
     place: str
     axis: str | None
@@ -21,6 +23,8 @@ class Concealed:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
+    """A case of a bank: the concealed effects, the diagnosis, and its errors."""
+
     number: int
     seed: int
     kind: str

@@ -65,6 +65,8 @@ BANKS = ("main", "dirty", "engine")
 
 @dataclass(frozen=True, slots=True)
 class Score:
+    """Figures of a bank with their intervals, the calibration of its stated probabilities, and its misses."""
+
     figures: tuple[Figure, ...]
     calibration: Calibration
     misses: tuple[Outcome, ...]
@@ -72,6 +74,7 @@ class Score:
 
 
 def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Score:
+    """Score of a bank's outcomes. followed: outcomes of ambiguous answers after a further recording."""
     figures = (
         *_single_figures(outcomes), *_null_figures(outcomes), *_open_set_figures(outcomes), *_pair_figures(outcomes),
         *follow_up_figures(followed), *_number_figures(outcomes),
@@ -169,4 +172,6 @@ def interval_coverage(true: Concealed, named: NamedEffect) -> dict[str, bool]:
 
 
 def is_main_covered(true: Concealed, named: NamedEffect) -> bool:
+    """Whether the 95 % interval of the effect's main parameter holds the true value. Raises KeyError where either is
+    missing."""
     return interval_coverage(true, named)[EFFECTS_BY_NAME[true.effect].main.name]

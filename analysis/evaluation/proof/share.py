@@ -28,6 +28,7 @@ class Figure:
 
 
 def share(name: str, among: Sequence[Item], right: Callable[[Item], bool]) -> Figure:
+    """Share of the items that are right, with Wilson's interval; without a value where there are no items."""
     hits, of = sum(right(each) for each in among), len(among)
     if not of:
         return Figure(name, None, None, None, 0, 0)
@@ -36,6 +37,7 @@ def share(name: str, among: Sequence[Item], right: Callable[[Item], bool]) -> Fi
 
 
 def wilson(hits: float, of: int) -> tuple[float, float]:
+    """Wilson's 95 % score interval of a proportion. of: at least 1."""
     low, high = proportion_confint(hits, of, method="wilson")
     return float(low), float(high)
 

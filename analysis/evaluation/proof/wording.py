@@ -5,6 +5,7 @@ from analysis.evaluation.proof.share import Figure
 
 
 def figure_text(figure: Figure) -> str:
+    """A figure with its 95 % interval, in per cent where it is a share; "none drawn" where it has no value."""
     if figure.value is None or figure.low is None or figure.high is None:
         return "none drawn"
     if figure.hits is None:
@@ -14,13 +15,16 @@ def figure_text(figure: Figure) -> str:
 
 
 def concealed_text(outcome: Outcome) -> str:
+    """The concealed effects with their axes; "nothing" where there are none."""
     return " + ".join(f"{c.effect}{f' of {c.axis}' if c.axis else ''}" for c in outcome.concealed) or "nothing"
 
 
 def answer_text(outcome: Outcome) -> str:
+    """The verdict, and the named effects with their axes and stated probabilities."""
     text = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in outcome.named)
     return f"{outcome.verdict.replace('_', ' ')}{f': {text}' if text else ''}"
 
 
 def strength_text(outcome: Outcome) -> str:
+    """The strengths of the concealed effects, from 0 (the weakest that is drawn) to 1, with commas between."""
     return ", ".join(f"{value:.2f}" for value in outcome.strengths)

@@ -20,6 +20,7 @@ _DIFFERS = (
 
 
 def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
+    """Findings on the published figure 3: off-axis motion by frequency, beside the simulated device."""
     coupling = {
         result.frequency_hz: result.phasor.off_axis_ratio
         for result in results

@@ -9,6 +9,8 @@ from equalizer.identification.frequency_response.resonances import Resonance
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredDevice:
+    """Measured frequency response of a device, with the resonances and the coupling onset found in it."""
+
     response: FrequencyResponse
     resonances: tuple[Resonance, ...]
     onset: CouplingOnset

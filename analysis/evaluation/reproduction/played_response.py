@@ -89,6 +89,8 @@ def coupling_db(response: ComplexArray) -> FloatArray:
 
 
 def played_row(played: PlayedResponse) -> PlayedRow:
+    """The response's figures of merit as a row of the document. error: rms departure from the identity matrix, per
+    axis."""
     found = quality(played.response)
     axes = played.response.shape[1]
     error = np.sqrt((np.abs(played.response - np.eye(axes)) ** 2).sum() / (axes * len(played.response)))

@@ -62,6 +62,8 @@ def direction_limit_hz(analysis: StudyAnalysis) -> float | None:
 
 
 def study_findings(analysis: StudyAnalysis) -> FigureFindings:
+    """Findings on the published figure 2: level, rise and cut of thresholds over frequency, beside the simulated
+    study."""
     means = _Means(analysis)
     tested = analysis.table.frequencies_hz
     findings = [

@@ -29,6 +29,8 @@ ChannelErrors = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True, slots=True)
 class Excerpt:
+    """A stretch of a channel of a time series: samples `start` to `stop`."""
+
     series: TimeSeries
     channel: int
     start: int
@@ -97,6 +99,8 @@ def _visibility(change: FloatArray) -> FloatArray:
 
 
 def draw_held_out(excerpt: Excerpt | None, noise_rms: Mapping[str, float], errors: ChannelErrors) -> Figure:
+    """Figure of an excerpt, measured and predicted, beside the errors of all channels; only the errors where `excerpt`
+    is None."""
     channels = list(next(iter(errors.values()), {}))
     if excerpt is None and not channels:
         return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")

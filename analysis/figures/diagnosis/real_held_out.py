@@ -15,6 +15,7 @@ _LOWEST = 1e-4
 
 
 def real_picture(answer: RealAnswer) -> Picture:
+    """Picture of a recording's held-out data, with its errors as alternative text."""
     rows = error_rows(answer)
     text = "; ".join(f"{name} {100 * value:.3g} %" for name, value, _ in rows)
     return Picture(

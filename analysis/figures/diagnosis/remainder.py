@@ -21,6 +21,7 @@ _NOISE = Line2D([], [], color=GREY, linewidth=4, alpha=0.4, label="noise")
 
 
 def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
+    """Picture of the residual spectra, with caption and alternative text."""
     return Picture(
         name="remainder",
         title="What is left over on held-out data",
@@ -32,6 +33,8 @@ def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
 
 
 def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
+    """Figure with a panel per spectrum: signal, residuals re-tuned and completed, and noise; a note where there are
+    none."""
     if not spectra:
         return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
     columns = min(_COLUMNS, len(spectra))

@@ -21,6 +21,7 @@ _BEYOND = " Shaded: no recording came there; what the formula says there is not 
 
 
 def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
+    """A picture for each signature, with caption and alternative text, numbered from 1."""
     return tuple(
         Picture(
             name=f"signature-{number}",
@@ -42,6 +43,7 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
 
 
 def draw_signature(signature: Signature) -> Figure:
+    """Figure of the residual without an effect, means per bin with two standard errors, and the fitted law."""
     figure = new_figure(8.8, 4.0)
     if not len(signature.measured_at):
         return draw_no_data_note(figure, "Too few samples show this effect to draw it.")

@@ -12,6 +12,8 @@ Dash = Literal["-"] | tuple[float, tuple[float, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Stage:
+    """Style of a prediction (as given, re-tuned or completed) in all figures of a diagnosis."""
+
     name: str
     """Name of the field in `Findings`."""
     words: str

@@ -60,6 +60,7 @@ class AnswersOnDelivery:
 
 
 def answers_on_delivery(trials: DeliveredTrials) -> tuple[AnswersOnDelivery, ...]:
+    """A regression for each cue; all but the strength have the strength's residual beside theirs."""
     strength = trials.values_db.get(Cue.INTENSITY)
     return tuple(
         _regress(trials, cue, values_db, None if cue is Cue.INTENSITY else strength)

@@ -86,6 +86,8 @@ def cue_abilities(trials: DeliveredTrials) -> tuple[CueAbility, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SameLevelFit:
+    """Difference of a cue between two directions at the same level, with its standard error and residuals."""
+
     difference_db: float
     error_db: float
     """Standard error."""

@@ -17,6 +17,8 @@ from protocols.trial import Phase, Trial
 
 
 class Cue(StrEnum):
+    """A quantity other than the direction by which two directions may differ as delivered."""
+
     INTENSITY = "intensity"
     """Delivered along the direction, over the level of the staircase; varies as a roved level does."""
     SPECTRUM = "spectrum"

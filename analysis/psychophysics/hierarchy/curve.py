@@ -30,6 +30,8 @@ SUREST = 30.0
 
 
 class Family(StrEnum):
+    """Shape F of the psychometric curve."""
+
     WEIBULL = "weibull"
     LOGISTIC = "logistic"
     GAUSS = "gauss"

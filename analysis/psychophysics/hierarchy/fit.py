@@ -14,6 +14,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HierarchicalFit:
+    """The fitted parameters of population and persons, for k frequencies and n persons, with derivatives there."""
+
     answers: Answers
     family: Family
     numbers: FloatArray

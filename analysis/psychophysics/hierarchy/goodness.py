@@ -14,6 +14,8 @@ BINS = 8
 
 @dataclass(frozen=True, slots=True)
 class ShareBin:
+    """Predicted and observed share of right answers in a bin of answers with similar predictions."""
+
     trials: int
     predicted: float
     observed: float
@@ -31,6 +33,7 @@ class GoodnessOfFit:
 
 
 def goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
+    """Shares in at most `BINS` bins of about equally many trials, in ascending order of the predicted share."""
     share, cells = predicted_shares(fit), fit.answers
     trials = cells.right + cells.wrong
     order = np.argsort(share, kind="stable")

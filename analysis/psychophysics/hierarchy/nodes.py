@@ -110,6 +110,8 @@ def laplace_moments(numbers: FloatArray, mode: FloatArray, information: FloatArr
 
 
 def place_nodes(moments: Moments, counts: Counts) -> Nodes:
+    """Nodes with log weights for each person: outer nodes for what is shared, inner nodes for each threshold. counts:
+    number of nodes by latent number."""
     root = np.linalg.cholesky(moments.covariance)
     places, log_weights = _outer_rule(counts)
     steps = np.einsum("nab,qb->nqa", root, places)

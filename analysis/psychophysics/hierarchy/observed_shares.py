@@ -32,6 +32,8 @@ class FittedCurves(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ObservedShare:
+    """Right answers among the trials of a bin of levels, with Wilson's 95 % interval."""
+
     level_db: float
     """Mean over the trials of the bin, re 1 N or re each person's threshold."""
     trials: int

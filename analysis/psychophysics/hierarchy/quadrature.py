@@ -24,6 +24,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Integrals:
+    """Log marginal likelihoods of n persons, their gradients, and the Hessian of their sum."""
+
     value: FloatArray
     """(n,): log marginal likelihood."""
     scores: FloatArray

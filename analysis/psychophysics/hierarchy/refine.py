@@ -25,6 +25,8 @@ SHORTER = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refined:
+    """The maximum by quadrature, with gradients and Hessian there."""
+
     numbers: FloatArray
     cost: float
     """Minus the penalized log marginal likelihood."""

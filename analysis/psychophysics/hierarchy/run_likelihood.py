@@ -126,4 +126,5 @@ def _profile_interval(
 
 
 def newton_or_none(db: float | None) -> float | None:
+    """Newtons from a level in dB re 1 N; None for None."""
     return None if db is None else math.pow(10.0, db / 20.0)

@@ -30,6 +30,8 @@ FREE_DB = 30.0
 
 @dataclass(frozen=True, slots=True)
 class SinglePersons:
+    """Estimates of each person without a population, and likelihood intervals of their runs."""
+
     family: Family
     frequencies_hz: tuple[float, ...]
     """Those with answers, in ascending order."""

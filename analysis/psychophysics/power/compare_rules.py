@@ -28,6 +28,8 @@ _KEY = 0x9517
 
 @dataclass(frozen=True, slots=True)
 class RuleResult:
+    """Error, bias and length of the runs of simulated people under a rule."""
+
     rule: str
     runs: int
     """With a threshold."""

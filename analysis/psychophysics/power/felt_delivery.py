@@ -22,6 +22,8 @@ Table = tuple[Row, ...]
 
 @dataclass(frozen=True, slots=True)
 class FeltDelivery:
+    """Tables of the delivered stimulus by frequency and direction, with masking and adaptation of simulated people."""
+
     tables: tuple[tuple[Table, Table], ...]
     """Per frequency of the crowd: of direction 1 and 2."""
     masking: float = 1.0

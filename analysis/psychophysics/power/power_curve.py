@@ -41,6 +41,8 @@ class StudyVerdict:
 
 @dataclass(frozen=True, slots=True)
 class Share:
+    """A share of the simulated studies with its interval."""
+
     value: float
     lower: float
     upper: float
@@ -49,6 +51,9 @@ class Share:
 
 @dataclass(frozen=True, slots=True)
 class PowerPoint:
+    """Power, coverage and bias of studies with a given number of people, by analysis: the primary (hierarchical)
+    analysis, means of runs, and the published procedure."""
+
     people: int
     studies: int
     trials_per_person: float

@@ -58,6 +58,8 @@ class Crowd:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedStudy:
+    """The answers and reversal means of a simulated study, beside the true thresholds."""
+
     answers: Answers
     threshold_n: FloatArray
     """(people, frequencies): arithmetic mean of the averaged reversals in newtons; NaN without all reversals."""

@@ -40,6 +40,7 @@ class PackedRule(NamedTuple):
 
 
 def pack(rule: StaircaseRule) -> PackedRule:
+    """The numbers of a staircase rule for the compiled kernel, with levels in dB re 1 N."""
     sizes = [phase.step_db for phase in rule.steps for _ in range(phase.reversals)]
     change = {StepChange.AT_REVERSAL: 0, StepChange.AT_NEXT_REVERSAL: 1, StepChange.AFTER_REVERSAL: 2}
     return PackedRule(

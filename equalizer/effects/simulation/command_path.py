@@ -15,6 +15,8 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ActuatorForce:
+    """Forces of the actuators, step by step, in the unit of the commands."""
+
     mean: FloatArray
     """(n steps, m): mean over each step."""
     end: FloatArray

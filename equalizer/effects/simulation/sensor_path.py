@@ -39,4 +39,5 @@ def undo_low_pass(response: FloatArray, sample_rate_hz: float, bandwidth_hz: flo
 
 
 def clip_to_range(response: FloatArray, limit: float) -> FloatArray:
+    """The response limited to -limit to limit, element by element; unchanged where limit is not above 0."""
     return np.clip(response, -limit, limit) if limit > 0 else response

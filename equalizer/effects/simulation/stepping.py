@@ -47,6 +47,8 @@ class Forces:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stepping:
+    """Time stepping of the mechanism in blocks of samples, from rest; `run` keeps the state from block to block."""
+
     rows: int
     """Rows per sample: of the drive, as wide as `into` is high, and of what `run` takes."""
     into: FloatArray

@@ -51,6 +51,8 @@ class MissingMass:
 
 
 def missing_mass(evidence: Evidence, axis: int) -> MissingMass:
+    """Welch spectra of an axis's acceleration and of the missing force at all axes, at the lines below 0.45 of the
+    sample rate where the acceleration has more than DRIVEN of its largest power."""
     rate, used = evidence.sample_rate_hz, evidence.used[:, None]
     acceleration = np.gradient(evidence.axis_velocity, 1 / rate, axis=0) * used
     window = min(int(WINDOW_S * rate), len(used))

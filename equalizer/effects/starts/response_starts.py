@@ -19,6 +19,7 @@ NEARER = 3
 
 
 def channels_of(evidence: Evidence, site: int) -> tuple[int, ...]:
+    """Columns of the response at which an effect acts: all for ALL_SITES, else that of the site."""
     return tuple(range(evidence.response.shape[1])) if site == ALL_SITES else (site,)
 
 

@@ -39,6 +39,8 @@ class LawFit:
 
 
 def axis_motion(evidence: Evidence, axis: int) -> AxisMotion:
+    """Motion and missing force of an axis at the samples that count; acceleration by central differences of
+    velocity."""
     time_s = np.arange(len(evidence.command)) / evidence.sample_rate_hz
     acceleration = np.gradient(evidence.axis_velocity[:, axis], 1 / evidence.sample_rate_hz)
     every = AxisMotion(
@@ -86,6 +88,7 @@ class PartialRegression:
 
 
 def regress_beside_linear(motion: AxisMotion, constant: bool = True) -> PartialRegression:
+    """Regression of the missing force with the regressors of `linear_part` projected out."""
     return PartialRegression(motion.force, linear_part(motion, constant))
 
 

@@ -23,6 +23,8 @@ _HIGHEST_RESAMPLED = 1.5
 
 @dataclass(frozen=True, slots=True)
 class OnsetRule:
+    """Rule that defines the coupling onset, and the bootstrap of its interval: number of draws and random seed."""
+
     threshold: float = 0.25
     """Threshold of the coupling: off-axis over on-axis response of the worst axis."""
     octaves: float = 1 / 12
@@ -42,6 +44,8 @@ class OnsetRule:
 
 @dataclass(frozen=True, slots=True)
 class CouplingOnset:
+    """Coupling onset of a frequency response with its confidence interval; result of `coupling_onset`."""
+
     frequency_hz: float | None
     """Onset; None: no coupling up to the last reliable line."""
     interval_hz: tuple[float, float] | None

@@ -21,6 +21,8 @@ _DRIVEN_KINDS = (*BROADBAND_KINDS, "sine", "slow", "step", "impact")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
+    """Spectra (rfft / length) of an excitation's periods, or of a single window."""
+
     length: int
     """Samples of one period: line k (from 1 on) lies at k rate / length."""
     command: ComplexArray

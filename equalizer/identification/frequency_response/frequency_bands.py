@@ -8,6 +8,8 @@ PUBLISHED_DIRECTION_LIMIT_HZ = 35.0
 
 @dataclass(frozen=True, slots=True)
 class FrequencyBand:
+    """A band of frequencies, the control method that suits it, and the reason as a sentence."""
+
     name: str
     """low, middle or high"""
     low_hz: float

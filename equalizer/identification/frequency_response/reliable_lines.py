@@ -16,6 +16,8 @@ _LEAST_INDEPENDENCE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class ReliabilityRules:
+    """Thresholds of coherence, frequency and energy below which a line counts as not reliable."""
+
     least_coherence: float = 0.5
     """Least coherence, of the worst output."""
     spring_margin: float = 1.1
@@ -28,6 +30,8 @@ class ReliabilityRules:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judgement:
+    """Which lines are reliable, and sentences on why others are not; result of `judge_lines`."""
+
     reliable: BoolArray
     """(lines,)"""
     remarks: tuple[str, ...]

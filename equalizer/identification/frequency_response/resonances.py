@@ -15,6 +15,8 @@ GAIN, COUPLING = "gain", "coupling"
 
 @dataclass(frozen=True, slots=True)
 class ResonanceSearch:
+    """Settings of the peak search, and of the 95 % intervals: number of noise draws and random seed."""
+
     prominence_db: float = 3.0
     """Prominence: ratio of a peak to the higher of the minima on its two sides."""
     bin_octaves: float = 1 / 48
@@ -27,6 +29,8 @@ class ResonanceSearch:
 
 @dataclass(frozen=True, slots=True)
 class Resonance:
+    """Mode fitted to a peak of a frequency response, with 95 % intervals of its frequency and damping ratio."""
+
     frequency_hz: float
     """Natural frequency of the fitted mode."""
     frequency_interval_hz: tuple[float, float]

@@ -26,6 +26,8 @@ _RANK_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedLines:
+    """Instrumental-variable estimate at the lines that several experiments share, with its noise."""
+
     frequency_hz: FloatArray
     response: ComplexArray
     """(lines, outputs, inputs)"""

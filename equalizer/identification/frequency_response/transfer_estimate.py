@@ -34,6 +34,8 @@ class TransferEstimateError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class EstimateSettings:
+    """Settings of a transfer function estimate: rules for reliable lines, noise averaging, and window length."""
+
     rules: ReliabilityRules = field(default_factory=ReliabilityRules)
     noise_lines: int = 17
     """Lines over which the noise variance is averaged."""

@@ -11,6 +11,9 @@ class MechanicalFitRefused(ValueError):  # noqa: N818 - an answer that a user re
 
 @dataclass(frozen=True, slots=True)
 class MechanicalFitSettings:
+    """Settings of a mechanical fit. Raises ValueError for a band that does not rise from zero or more, a negative
+    number of modes, or a floor outside 0 to 1."""
+
     band_hz: tuple[float, float] | None = None
     """Band of the fit; None: the band that the commands excite, from the lowest line on."""
     most_modes: int = 8
@@ -42,6 +45,8 @@ class MechanicalFitSettings:
 
 @dataclass(frozen=True, slots=True)
 class OrderTried:
+    """A model structure that the order selection fitted, with its cross-validated error."""
+
     what: str
     """Description of the structure: "driven axes alone", "with 2 modes", "with a delay"..."""
     coordinates: int
@@ -67,6 +72,9 @@ class ChannelError:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MechanicalFit:
+    """Result of a mechanical fit. `error`, `held_out` and `noise` are root mean square over all channels, relative to
+    the response, within the fitted band."""
+
     model: MechanicalModel
     """The fitted model. Its first coordinates are the motions of the driven axes, in the commands' order."""
     errors: tuple[ChannelError, ...]

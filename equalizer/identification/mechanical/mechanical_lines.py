@@ -117,6 +117,8 @@ def select_band(segments: Sequence[SegmentLines], band_hz: tuple[float, float] |
 
 
 def have_same_lines(first: SegmentLines, second: SegmentLines) -> bool:
+    """Whether two segments without transients agree in rate, hold and number of lines, so that their lines are the
+    same."""
     return not (first.transient or second.transient) and (first.rate_hz, first.hold, len(first.frequency_hz)) == (
         second.rate_hz, second.hold, len(second.frequency_hz),
     )  # fmt: skip

@@ -30,6 +30,8 @@ _SMALL_START = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModeStart:
+    """Structure with a further oscillator, the starting values of all its unknowns, and the oscillator's resonance."""
+
     structure: Structure
     unknowns: FloatArray
     frequency_hz: float

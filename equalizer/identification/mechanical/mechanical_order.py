@@ -162,6 +162,8 @@ def choose_simplest(starts: Sequence[RefinedFit[Structure]]) -> RefinedFit[Struc
 
 
 def improves_enough(now: RefinedFit[Structure], larger: RefinedFit[Structure]) -> bool:
+    """Whether the larger structure lowers the squared error on held-out lines by more than LEAST_GAIN of it, and by
+    more than PER_UNKNOWN times what its further unknowns gain by chance."""
     gain = now.left_out - larger.left_out
     unknowns = larger.structure.parameters - now.structure.parameters
     by_chance = unknowns * larger.left_out / max(larger.left_out_count, 1)

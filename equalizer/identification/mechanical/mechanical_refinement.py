@@ -17,6 +17,8 @@ S = TypeVar("S", Structure, ModalStructure)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RefinedFit(Generic[S]):
+    """Unknowns refined by `refine_unknowns`, with their misfit on the fitted and on the held-out lines."""
+
     structure: S
     unknowns: FloatArray
     squares: float

@@ -99,6 +99,7 @@ def _stiffness_rows(
 
 
 def triangle_pairs(m: int) -> list[tuple[int, int]]:
+    """Row and column of the m (m + 1) / 2 entries of a lower triangle, row by row."""
     return list(zip(*(part.tolist() for part in np.tril_indices(m)), strict=True))
 
 
@@ -113,11 +114,14 @@ def _entry_force(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
 
 
 def solve_scaled(rows: FloatArray, right: FloatArray) -> FloatArray:
+    """(k,): least-squares solution of rows (n, k) @ x = right (n,), computed with columns of unit length; singular
+    values below 1e-12 of the largest are cut off."""
     scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
     return np.asarray(np.linalg.lstsq(rows / scale, right, rcond=1e-12)[0] / scale)
 
 
 def symmetric_matrix(entries: FloatArray, m: int) -> FloatArray:
+    """(m, m): symmetric matrix from the m (m + 1) / 2 entries of its lower triangle, row by row."""
     lower = np.zeros((m, m))
     lower[np.tril_indices(m)] = entries
     return np.asarray(lower + np.tril(lower, -1).T)

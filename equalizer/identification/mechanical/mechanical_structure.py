@@ -238,6 +238,7 @@ def start_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float)
 
 
 def remove_mode(structure: Structure, unknowns: FloatArray, number: int) -> tuple[Structure, FloatArray]:
+    """Structure and unknowns without the mode of that index, from 0."""
     part = structure.slices["modes"]
     rows = np.delete(unknowns[part].reshape(structure.modes, -1), number, axis=0)
     return replace(structure, modes=structure.modes - 1), np.concatenate([unknowns[: part.start], rows.ravel()])

@@ -73,6 +73,7 @@ def _left_out_error(found: FoundModes) -> float:
 
 
 def balance_fit(fit: RefinedFit[ModalStructure]) -> RefinedFit[ModalStructure]:
+    """The same fit with the factors of `balancing_factors` on its unknowns; every response is unchanged."""
     factors = balancing_factors(fit.structure, fit.unknowns)
     return replace(fit, unknowns=fit.unknowns * factors, slope=fit.slope / factors)
 

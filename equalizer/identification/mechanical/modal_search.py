@@ -25,6 +25,9 @@ _MOST_DELAY_SAMPLES = 20.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundModes:
+    """Modes whose shapes are free (p m numbers each), and their misfit on the held-out lines: the sum of squares and
+    its number of terms."""
+
     logs: FloatArray
     """(2 modes,): logs of frequencies (rad/s), then of damping ratios."""
     delay_s: float

@@ -58,10 +58,13 @@ class Candidate:
 
 
 def subspace_starts(lines: WeightedLines, settings: IdentificationSettings) -> tuple[Start, ...]:
+    """Starting models by frequency-domain subspace identification, for each number in `settings.longer_horizons`."""
     return tuple(subspace_start(lines, settings, longer) for longer in settings.longer_horizons)
 
 
 def subspace_start(lines: WeightedLines, settings: IdentificationSettings, longer: int) -> Start:
+    """Starting model by frequency-domain subspace identification with a warped frequency axis. longer: block rows
+    beyond the shortest useful horizon."""
     radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
     horizon = default_horizon(settings.order, lines.response.shape[1]) + longer
     subspace = estimate_subspace(lines, horizon, settings.centre_hz)
@@ -88,6 +91,7 @@ def record_starts(
 
 
 def refine_start(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
+    """Candidate from a start: B and D by linear least squares, then refined as in `refine_candidate`."""
     radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
     return refine_candidate(start.name, complete_form(start.form, lines), lines, settings, radius)
 

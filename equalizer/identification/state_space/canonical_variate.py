@@ -23,6 +23,7 @@ _SILENT_KINDS = ("rest", "free")
 
 
 def decimation_factor(sample_rate_hz: float, high_hz: float) -> int:
+    """Largest decimation factor that leaves RATE_OVER_BAND samples or more per period of high_hz, at least 1."""
     return max(1, int(sample_rate_hz / (RATE_OVER_BAND * high_hz)))
 
 

@@ -19,6 +19,8 @@ DECAYS = 5.0
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
+    """Error of a free simulation over the segments that were kept for a test; result of `validate_on_test`."""
+
     error: float
     """Root-mean-square of prediction - response over that of the response, all channels, within the model's band."""
     noise: float | None

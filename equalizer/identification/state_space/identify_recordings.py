@@ -31,6 +31,8 @@ SMOOTHED = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentifiedRecordings:
+    """Result of `identify_recordings`: frequency response of the recordings, and the state-space model fitted to it."""
+
     estimate: FrequencyResponse
     fitted: FrequencyResponse
     """The frequency response that the model was fitted to: the estimate, or its local averages."""

@@ -17,6 +17,8 @@ NOISE_TRUSTED = 1.1
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
+    """Lack of fit of a model on measured lines: what differs beyond the noise, and what the noise may hide."""
+
     error: float
     """Root mean square of model - estimate beyond the noise, relative to the response's; 0 where only noise is left."""
     most: float

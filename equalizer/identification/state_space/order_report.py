@@ -19,6 +19,8 @@ VISIBLE = 2.0
 
 @dataclass(frozen=True, slots=True)
 class OrderRow:
+    """Errors and computing cost of a model of this order, fitted to every second line and tested on the others."""
+
     order: int
     held_out_cost: float
     """Squared error over noise variance on held-out lines: 1 plus the contribution of the model error."""
@@ -32,6 +34,8 @@ class OrderRow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OrderReport:
+    """Comparison of model orders, as made by `compare_orders`."""
+
     singular_values: FloatArray
     """Singular values of the whitened data, largest first: about 1 where there is only noise."""
     visible_order: int
@@ -88,6 +92,7 @@ def multiply_adds(order: int, outputs: int, inputs: int) -> int:
 
 
 def dense_multiply_adds(order: int, outputs: int, inputs: int) -> int:
+    """Multiplications per tick with full matrices A, B, C and D."""
     return order**2 + order * (outputs + inputs) + outputs * inputs
 
 

@@ -47,6 +47,8 @@ class SlowPole:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelaxedFit:
+    """Candidate after the likelihood-ratio test of the decay bound; result of `relax_poles`."""
+
     candidate: Candidate
     """The candidate with its poles relaxed; the given one where no pole needs a longer decay."""
     bound_costs: bool

@@ -95,6 +95,7 @@ def average_bins(
 
 
 def bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> FloatArray:
+    """(bins,): mean frequency of the lines of each bin."""
     return np.array([lines.frequency_hz[part].mean() for part in bins])
 
 

@@ -42,12 +42,16 @@ SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LowBand:
+    """Low band: the rigid model whose inverse dynamics give its forces, and the high-pass corner of its motion (Hz)."""
+
     rigid: RigidModel
     corner_hz: float = CORNER_HZ
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HighBand:
+    """High band, played with one degree of freedom; a stylus actuator, where there is any, takes its upper part."""
+
     source: ResponseSource
     """Response of the device over the whole high band."""
     settings: HighBandSettings = field(default_factory=HighBandSettings)
@@ -56,6 +60,8 @@ class HighBand:
 
 @dataclass(frozen=True, slots=True)
 class CapPolicy:
+    """Cap on the norm of the force vector that enters the device, all bands added, and what is done above it."""
+
     cap_n: float
     constrain: bool = False
     """False: forces above the cap are refused. True: the middle band is solved again under the cap left by the other

@@ -33,6 +33,8 @@ class ResponseSource(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelledResponse:
+    """Frequency response of an identified state-space model as a `ResponseSource`, also outside the model's band."""
+
     model: IdentifiedModel
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
@@ -75,6 +77,8 @@ class HighBandSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HighBandForces:
+    """Forces along the tried direction with the smallest peak; result of `high_band_forces`."""
+
     forces: FloatArray
     """(N, m)"""
     direction: FloatArray
@@ -140,6 +144,7 @@ def predict_acceleration(forces: FloatArray, sample_rate_hz: float, source: Resp
 
 
 def lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
+    """(samples // 2 + 1,): frequencies of the lines of a real FFT of that many samples."""
     return np.asarray(np.fft.rfftfreq(samples, 1 / sample_rate_hz), dtype=np.float64)
 
 

@@ -35,6 +35,8 @@ class SlowMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LowBandForces:
+    """Forces of the low band along its planned motion, with and without the rendered spring's share."""
+
     total: FloatArray
     """(N, m), N: force that must enter the device along the motion."""
     superposed: FloatArray

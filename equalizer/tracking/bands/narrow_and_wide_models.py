@@ -66,6 +66,8 @@ class TwoModels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandFacts:
+    """Predicted errors and other figures of a banded feedforward; errors are relative to what is wanted in the band."""
+
     edges_hz: tuple[float, float]
     cut_error: float
     """Error in the middle band if the run-in and run-out were only cut off."""
@@ -82,6 +84,8 @@ class BandFacts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedFeedforward:
+    """Result of `banded_feedforward`: forces from the first row on, one row per row of the wanted acceleration."""
+
     feedforward: Feedforward
     """Forces of all bands; their `error` is that in the middle band, by the narrow model."""
     facts: BandFacts
@@ -120,6 +124,8 @@ def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardS
 
 
 def banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
+    """Equalizer in three bands, split by linear-phase filters EDGE_ROOM_HZ beyond the narrow model's band on either
+    side. weight: R = weight I, of |u|². Raises ValueError for a weight outside 1e-3 to 1e-2."""
     low, high = models.narrow.band_hz
     edges = BandEdges(low - EDGE_ROOM_HZ, high + EDGE_ROOM_HZ)
     return BandedEqualizer(
@@ -132,6 +138,7 @@ def banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
 
 
 def rigid_part(model: IdentifiedModel) -> RigidModel:
+    """Rigid model (mass, damping, stiffness) fitted to the model's response in the lowest RIGID_OCTAVES of its band."""
     low, high = model.band_hz
     lines_hz = np.geomspace(low, min(high, low * 2**RIGID_OCTAVES), RIGID_LINES)
     return fit_rigid_model(lines_hz, model_response(model, lines_hz), model.sample_rate_hz)

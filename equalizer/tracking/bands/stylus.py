@@ -35,6 +35,8 @@ class StylusActuator:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StylusShare:
+    """Split of a wanted acceleration between motors and stylus actuator; result of `share_with_stylus`."""
+
     command: FloatArray
     """(N,), in the actuator's unit"""
     played: FloatArray

@@ -40,6 +40,8 @@ LEAST_SPEED = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compensation:
+    """Result of `compensate`: forces with those of the known effects added, and which effects these are."""
+
     forces: FloatArray
     """(N, m): forces to play instead of the given ones."""
     used: tuple[ModelEffect, ...]
@@ -123,6 +125,8 @@ def axis_gains(physics: MechanicalModel, inputs: tuple[str, ...], outputs: tuple
 
 
 def slip_speed(velocity: FloatArray) -> float:
+    """Velocity below which a friction force changes sign smoothly: SLIP_SHARE of the rms of velocity (N,), in its
+    unit."""
     return SLIP_SHARE * float(np.sqrt(np.mean(velocity**2)))
 
 

@@ -29,4 +29,5 @@ def band_share(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> FloatA
 
 
 def padded_length(samples: int, sample_rate_hz: float) -> int:
+    """Number of samples with QUIET_S of zeros appended."""
     return samples + round(QUIET_S * sample_rate_hz)

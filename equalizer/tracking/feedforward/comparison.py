@@ -23,6 +23,8 @@ from equalizer.tracking.feedforward.quality import Quality, quality
 
 @dataclass(frozen=True, slots=True)
 class ComparisonRow:
+    """Quality of an inverse at a place: its name, the place's name, and its computing cost."""
+
     name: str
     where: str
     quality: Quality

@@ -35,6 +35,8 @@ PROVED = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class FeedforwardSettings:
+    """Weight of the forces (R = weight I, of |u|²), and cap on the norm of the force vector."""
+
     weight: float = 1e-3
     cap_n: float = 3.0
     constrain: bool = False
@@ -43,6 +45,8 @@ class FeedforwardSettings:
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class Feedforward(Summarised):
+    """Forces for a wanted acceleration, and the model's prediction of what they achieve."""
+
     forces: Signal
     """(N, m)"""
     wanted: FloatArray

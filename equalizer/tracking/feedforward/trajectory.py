@@ -21,6 +21,8 @@ class TableError(ListedProblemsError):
 
 @dataclass(frozen=True, slots=True)
 class TableKind:
+    """Layout of a CSV table: its header, and quantity and unit of the columns after the time."""
+
     name: str
     header: tuple[str, ...]
     quantity: str

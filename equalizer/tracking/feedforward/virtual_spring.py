@@ -15,6 +15,9 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class VirtualSpring:
+    """Stiffness and damping of the virtual spring, both zero without a spring. Raises ValueError for negative or
+    non-finite values."""
+
     stiffness_n_per_m: float = 0.0
     damping_n_s_per_m: float = 0.0
 

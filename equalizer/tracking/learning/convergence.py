@@ -14,6 +14,9 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Convergence:
+    """Prediction for iterative learning with gain beta: worst-case share of an error that remains after a
+    correction."""
+
     frequency_hz: FloatArray
     """(lines,): frequencies within the band."""
     surviving: FloatArray

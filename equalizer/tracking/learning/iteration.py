@@ -34,6 +34,8 @@ EDGE_S = 0.03
 
 
 class Verdict(Enum):
+    """Decision after each measurement: to continue, or the reason to stop. The value states it in words."""
+
     CONTINUE = "play the forces and measure"
     AT_FLOOR = "what is left cannot be told from the measured noise"
     DIVERGING = "each correction made it worse; the best forces so far are kept"
@@ -98,6 +100,8 @@ class Repetition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IterationState:
+    """State of iterative learning control between two plays: made by `begin`, advanced by `next_forces`."""
+
     repetition: Repetition
     forces: FloatArray
     """(N, m): forces to play next; with a verdict other than CONTINUE the best ones."""
@@ -187,6 +191,7 @@ def noise_of_rest(rest: FloatArray, repetition: Repetition) -> float:
 
 
 def rms(samples: FloatArray) -> float:
+    """Root mean square over all entries, in their unit."""
     return float(np.sqrt(np.mean(samples**2)))
 
 

@@ -17,6 +17,9 @@ InverseOfLength = Callable[[int], Invert]
 
 
 def inverse_operator(model: IdentifiedModel, weight: float = 1e-3) -> InverseOfLength:
+    """Inverse of a model by finite-horizon LQR tracking, from rest and with a free end. weight: R = weight I, of
+    |u|²."""
+
     def of_length(rows: int) -> Invert:
         gains = stored_gains(make_tracking_problem(model, TrackingWeights(weight)), rows)
         return lambda wanted: track(gains, wanted).forces

@@ -34,6 +34,8 @@ class TurningTransient:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LiveState:
+    """State of a transient while it is played: its next row, and the state of the model."""
+
     tick: int
     """The row that comes next."""
     x: FloatArray
@@ -42,6 +44,8 @@ class LiveState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TurningResult:
+    """Forces and predicted response of T ticks; result of `play`."""
+
     forces: FloatArray
     """(T, m)"""
     predicted: FloatArray
@@ -63,6 +67,7 @@ def normal_transient(gains: StoredGains, recording: FloatArray) -> TurningTransi
 
 
 def initial_state(transient: TurningTransient) -> LiveState:
+    """State at the first row, with the model at rest."""
     return LiveState(0, np.zeros(transient.problem.order))
 
 

@@ -48,6 +48,8 @@ class TrackingLoss:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CappedForces:
+    """Result of `track_under_cap`: forces from rest under the cap, and the tracking error that the cap causes."""
+
     forces: FloatArray
     """(N, m); together with the forces `already` there, every row is within the cap."""
     predicted: FloatArray
@@ -57,6 +59,8 @@ class CappedForces:
 
 @dataclass(frozen=True, slots=True)
 class CapSettings:
+    """Stopping rule of ADMM: the duality gap that must be reached, and the largest number of iterations."""
+
     gap: float = 1e-5
     """Relative duality gap at which the iteration ends."""
     rounds: int = 5000

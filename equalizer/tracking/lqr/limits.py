@@ -64,6 +64,7 @@ def require_under_cap(forces: FloatArray, cap_n: float, sample_rate_hz: float) -
 
 
 def require_cap(cap_n: float) -> float:
+    """The cap itself. Raises ValueError unless it is a positive, finite number."""
     if not (np.isfinite(cap_n) and cap_n > 0):
         raise ValueError(f"cap_n is {cap_n}; it must be a positive number")
     return cap_n

@@ -47,6 +47,8 @@ class StoredGains:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackResult:
+    """Optimal forces for a trajectory, and the model's response to them; result of `track`."""
+
     forces: FloatArray
     """(N, m), one row per row of the trajectory."""
     predicted: FloatArray

@@ -17,6 +17,9 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProbl
 
 @dataclass(frozen=True, slots=True)
 class Padding:
+    """Durations of the zeros before and after a trajectory. Raises TrackingError for a negative or non-finite
+    duration."""
+
     before_s: float = 0.3
     after_s: float = 0.3
 
@@ -36,6 +39,8 @@ CAUSAL = Padding(before_s=0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PaddedTrack:
+    """Tracking of a padded trajectory, and its error with and without the padding played; result of `track_padded`."""
+
     whole: TrackResult
     """The trajectory with padding, to be played where there is time for it."""
     rows: slice

@@ -74,6 +74,8 @@ class BandLines:
 
 
 def band_lines(model: IdentifiedModel, band_hz: tuple[float, float]) -> BandLines:
+    """The model's response on a logarithmic grid of LINES_PER_OCTAVE, over the band and half of BEYOND to either
+    side."""
     low, high = band_hz
     widened = (low * (1 - BEYOND / 2), min(high * (1 + BEYOND / 2), 0.49 * model.sample_rate_hz))
     count = int(np.ceil(LINES_PER_OCTAVE * np.log2(widened[1] / widened[0])))

@@ -10,6 +10,8 @@ from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 
 def blend_at(workspace: WorkspaceModels, place_m: Place) -> ModelsAtPlace:
+    """All models with the weights of linear interpolation at a place, none negative. A single model without a place is
+    used everywhere, with a remark."""
     if len(workspace) == 1 and workspace.models[0].place_m is None:
         return ModelsAtPlace(
             place_m, workspace.models, (1.0,), ("the only model does not say where it was identified",)

@@ -42,6 +42,7 @@ def used_models(at: ModelsAtPlace) -> tuple[tuple[float, IdentifiedModel], ...]:
 
 
 def inverse_at(at: ModelsAtPlace, weight: float) -> InverseOfLength:
+    """Weighted sum of the inverse operators of all models at a place. weight: R = weight I, of |u|²."""
     parts = [(share, inverse_operator(model, weight)) for share, model in used_models(at)]
 
     def of_length(rows: int) -> Invert:

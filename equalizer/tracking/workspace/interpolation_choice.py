@@ -37,6 +37,8 @@ class HeldOutPlace:
 
 @dataclass(frozen=True, slots=True)
 class PlaceCheck:
+    """Errors of both interpolations at a held-out place, against the response that is known there."""
+
     place_m: Place
     blended: Quality
     modal: Quality | None
@@ -49,6 +51,8 @@ class PlaceCheck:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InterpolationChoice:
+    """The chosen interpolation between places, ready for use by `at`, and the checks that decided it."""
+
     interpolation: Interpolation
     reason: str
     """A sentence for the user."""

@@ -32,6 +32,9 @@ POOR_FIT = 0.02
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalInterpolation:
+    """Matched resonances of all models, and the smooth remainders of their responses; `at` gives a model for a
+    place."""
+
     workspace: WorkspaceModels
     tracks: tuple[tuple[BandMode, ...], ...]
     """Each resonance through all models, in their order."""

@@ -15,6 +15,8 @@ from equalizer.tracking.workspace.workspace_models import Place
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelsAtPlace:
+    """Models for a place with their weights; the forces there are the weighted sum of those of each model."""
+
     place_m: Place
     models: tuple[IdentifiedModel, ...]
     weights: tuple[float, ...]

@@ -27,6 +27,8 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaceWeights:
+    """Interpolation weights at a place, of points where models were identified; result of `place_weights`."""
+
     linear: FloatArray
     """(points,): none negative, sum 1; linear between neighbours, continuous, exact at the points."""
     smooth: FloatArray

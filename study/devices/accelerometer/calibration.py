@@ -27,6 +27,8 @@ WORST_CONDITION = 10.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
+    """Calibration of an accelerometer with three channels: converts raw values to acceleration."""
+
     bias: FloatArray
     """(3,), raw at no acceleration."""
     sensitivity: FloatArray

@@ -58,6 +58,8 @@ class Stretch:
 
 
 class History:
+    """Samples of the last `KEPT_S` seconds and their arrivals, behind a lock; all times are in seconds."""
+
     def __init__(self) -> None:
         self._samples, self._arrivals = Table(5), Table(7)
         """Device time in s, restarts, raw; arrival, samples until then, newest device time, and `Counts`."""

@@ -76,6 +76,9 @@ Packets = npt.NDArray[np.void]
 
 
 class PacketParser:
+    """Parser of a board's byte stream: `feed` takes the bytes as they come, and returns the samples of whole packets.
+    Packets with a wrong checksum are skipped and counted."""
+
     def __init__(self) -> None:
         self._rest: Bytes = np.zeros(0, dtype=np.uint8)
         self._last: Packets | None = None

@@ -39,6 +39,8 @@ AT_ONCE = 4096
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
+    """Sensor values resampled to the ticks of the loop."""
+
     values: FloatArray
     """(k, channels) at the ticks; NaN where samples are missing."""
     fit: ClockFit | None

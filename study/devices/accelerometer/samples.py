@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
+    """n samples of a board with three channels."""
+
     sequence: npt.NDArray[np.int64]
     """(n,), counted on where the counter of the board begins anew."""
     time_us: npt.NDArray[np.int64]

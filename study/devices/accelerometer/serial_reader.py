@@ -25,6 +25,8 @@ class Port(Protocol):
 
 
 class SerialSource:
+    """A `Source` that parses the bytes of an open serial line. Closing it closes the line."""
+
     def __init__(self, port: Port) -> None:
         self._port, self._parser = port, PacketParser()
 

@@ -45,6 +45,7 @@ def calibrate_on_table(path: str, baud: int, before_each: BeforeEach, rest_s: fl
 
 
 def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
+    """The [accelerometer] table for the lab's settings file. path: port of the board; baud: its rate."""
     reach = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
     lowest, highest = float((calibration.bias - reach).min()), float((calibration.bias + reach).max())
     within = f"[{max(0, round(lowest))}, {min(65_535, round(highest))}]"

@@ -12,6 +12,7 @@ from study.devices.rig import READING_SIZE, Halves, Rig
 
 
 def halves_of(rig: Rig) -> Halves | None:
+    """Compiled halves of a tick of this rig; None where the rig has none."""
     halves = getattr(rig, "halves", None)
     return halves if isinstance(halves, Halves) else None
 
@@ -21,6 +22,9 @@ MISSED = Part(govern.miss, MISS)
 
 
 class CompiledTicks:
+    """Runs the ticks of a rig by the compiled loop of `compiled_drive`, and gives its newest reading. The loop is
+    compiled when the object is made."""
+
     def __init__(self, halves: Halves, governor: Governor, course: FloatArray) -> None:
         self._halves = halves
         self._governor = governor

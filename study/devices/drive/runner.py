@@ -74,6 +74,8 @@ def run_block(  # noqa: PLR0913 - compiled code takes function pointers one by o
 
 
 class Runner(Protocol):
+    """Interface of a runner: runs the ticks of a rig, and ends its force when the rig fails."""
+
     catches_up: bool
     """Whether ticks that are late can still be run: a simulated world waits, a real one does not."""
     failure: BaseException | None

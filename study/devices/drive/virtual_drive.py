@@ -8,6 +8,8 @@ from study.devices.governor.governor import Governor
 
 
 class VirtualDrive:
+    """Drive of a device in virtual time: ticks run in the caller's thread whenever the clock goes on."""
+
     def __init__(self, runner: Runner, governor: Governor, clock: VirtualClock, rate_hz: float) -> None:
         self._runner = runner
         self._governor = governor

@@ -20,6 +20,8 @@ VALID_FOR = timedelta(days=180)
 
 @dataclass(frozen=True, slots=True)
 class Acceptance:
+    """Content of acceptance.json: the accepted device, operator and date, and what was measured."""
+
     device: str
     details: str
     """Serial number, firmware and SDK. Another of any of them voids it."""
@@ -40,10 +42,12 @@ class Acceptance:
 
 
 def acceptance_file() -> Path:
+    """Path of acceptance.json, in the folder of the lab's settings. The file need not exist."""
     return lab_file().with_name("acceptance.json")
 
 
 def write_acceptance(acceptance: Acceptance) -> Path:
+    """Write acceptance.json, in the place of an older acceptance; its folder is made if missing. Returns the path."""
     path = acceptance_file()
     path.parent.mkdir(parents=True, exist_ok=True)
     written = path.with_suffix(".new")

@@ -77,12 +77,14 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
 
 
 def device_error(name: str, error: LibraryError) -> DeviceError:
+    """Error for a failed call of the vendor's library. name: of the device."""
     return DeviceError(
         f"The {name} does not work", f"The library says: {error}.", "Check its power and its cable, then try again."
     )
 
 
 def missing_library_error(computer: Computer) -> DeviceError:
+    """Error for a computer on which the vendor's library is not found; it lists the folders that were searched."""
     places = list(dict.fromkeys(str(folder) for folder, _ in library_patterns(computer)))
     return DeviceError(
         "The device's library is not installed",

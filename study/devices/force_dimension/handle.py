@@ -36,11 +36,14 @@ TRIES = 3
 
 
 def why_off(cause: int) -> str:
+    """Words for a cause by which the device's force is off, as in `Status.off_cause`."""
     return OFF_CAUSES.get(cause, "the device does not say why")
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
+    """State of the device as reported by dhdGetStatus."""
+
     powered: bool
     calibrated: bool
     force_on: bool

@@ -52,6 +52,8 @@ class SensorSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class LabSettings:
+    """Content of the lab's settings file; every key is optional."""
+
     effector_mass_kg: float | None = Field(default=None, gt=0, le=2)
     """Mass that the gravity compensation carries: handle and sensor. None: the model's own."""
     effective_mass_kg: float | None = Field(default=None, ge=0.01, le=5)
@@ -62,6 +64,8 @@ class LabSettings:
 
 
 def lab_file() -> Path:
+    """Path of the settings file: from the environment variable HAPTEQ_DEVICE_FILE, else ~/.config/hapteq/device.toml.
+    The file need not exist."""
     named = os.environ.get(FILE_VARIABLE)
     return Path(named) if named else Path.home() / ".config" / "hapteq" / "device.toml"
 

@@ -36,6 +36,8 @@ SAME_M = 1e-3
 
 
 class VendorLinkage:
+    """Linkage of an opened device, as the vendor's library computes it. Nothing moves."""
+
     def __init__(self, handle: Handle, model: DeviceModel, info: DeviceInfo) -> None:
         self.info = info
         self._handle, self._model = handle, model

@@ -15,6 +15,8 @@ WINDOWS_FOLDERS = (("LOCALAPPDATA", "Force Dimension"), ("ProgramFiles", "Force 
 
 @dataclass(frozen=True, slots=True)
 class Computer:
+    """What decides where the vendor's library is searched."""
+
     system: str
     """As sys.platform: linux, darwin, win32."""
     machine: str
@@ -24,6 +26,7 @@ class Computer:
 
 
 def this_computer(environ: Mapping[str, str]) -> Computer:
+    """The running computer, with these environment variables."""
     return Computer(sys.platform, platform.machine(), environ, Path.home())
 
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class DeviceModel:
+    """Constants of a device model of the vendor."""
+
     name: str
     """Name as written by the vendor."""
     system_types: tuple[int, ...]

@@ -22,6 +22,8 @@ ADVICE = (
 
 @dataclass(frozen=True, slots=True)
 class UsbDevice:
+    """A device of the vendor on the USB; may_open: whether this account may read and write it."""
+
     product: str
     may_open: bool
 

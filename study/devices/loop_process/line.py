@@ -108,6 +108,9 @@ class Call:
 
 
 class Line:
+    """A pipe to the loop's process, with a thread that sends its calls in order. A broken pipe ends them with
+    `LoopGoneError`."""
+
     def __init__(self, connection: End, name: str) -> None:
         self._connection = connection
         self._calls: SimpleQueue[Call | None] = SimpleQueue()

@@ -63,6 +63,8 @@ def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevi
 
 
 class RemoteDevice:
+    """A device whose loop runs in a process of its own, with the interface of `Device`; opened by `open_remotely`."""
+
     def __init__(
         self, process: LoopProcess, info: DeviceInfo, settings: DeviceSettings, ring: Ring | None = None
     ) -> None:

@@ -41,6 +41,8 @@ class BrokenOffError(Exception):
 
 
 class DeviceServer:
+    """Serves an opened device to the caller's process: a thread per pipe of `LINES` calls the device's methods."""
+
     def __init__(
         self,
         device: Device,

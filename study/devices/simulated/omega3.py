@@ -59,6 +59,7 @@ def build_omega3(
 
 
 def omega3_info(name: str, effective_mass_kg: float, details: str) -> DeviceInfo:
+    """`DeviceInfo` of a simulated omega.3, with its fixed rate and maximum force."""
     return DeviceInfo(
         name=name,
         simulated=True,

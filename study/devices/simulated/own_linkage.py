@@ -57,6 +57,8 @@ class SimulatedLinkage:
 
 @dataclass(frozen=True, slots=True)
 class FittedLinkage:
+    """Parameters of the simulated device fitted to a calibration, and what the fit leaves over."""
+
     parameters: Omega3Parameters
     jacobian_misfit: float
     """Largest difference from the calibration's joint rates, relative to their largest."""
@@ -65,6 +67,7 @@ class FittedLinkage:
 
 
 def simulated_linkage() -> SimulatedLinkage:
+    """Linkage of the simulated omega.3 with its default parameters."""
     parameters = Omega3Parameters()
     mass_kg = effective_mass_kg(parameters, pack_parameters(parameters, False, (0.0, 0.0, 0.0)))
     return SimulatedLinkage(parameters, omega3_info(NAME, mass_kg, "parameter set 1, without a hand"))

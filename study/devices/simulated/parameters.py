@@ -129,6 +129,8 @@ class Stops:
 
 @dataclass(frozen=True, slots=True)
 class Omega3Parameters:
+    """All parameters of the simulated omega.3, with the hand that holds it and its accelerometer."""
+
     linkage: Linkage = field(default_factory=Linkage)
     masses: Masses = field(default_factory=Masses)
     drives: Drives = field(default_factory=Drives)

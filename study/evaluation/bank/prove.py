@@ -53,6 +53,8 @@ CONTROL_TURNS = 3
 
 @dataclass(frozen=True, slots=True)
 class Proof:
+    """Result of a bank of concealed cases, with its score, follow-ups and controls."""
+
     folder: ProofFolder
     plan: BankPlan
     seal: str

@@ -42,6 +42,8 @@ PROCESSOR_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class BankPlan:
+    """Seed and number of the cases of a bank."""
+
     seed: int
     cases: int
     brief: bool = False

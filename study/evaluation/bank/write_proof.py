@@ -27,6 +27,9 @@ DOCUMENT, TABLE, PAGE = "proof.json", "proof.csv", "report.html"
 
 @dataclass(frozen=True, slots=True)
 class CaseRow:
+    """A case of the bank as a row of proof.csv and of the table of misses: what was concealed, and what the diagnosis
+    answered."""
+
     number: int
     seed: int
     kind: str
@@ -52,6 +55,9 @@ class CaseRow:
 
 @dataclass(frozen=True, slots=True)
 class FigureRow:
+    """A figure as a row of the table to keep: value, interval from `low` to `high`, and the number of items it was
+    measured on."""
+
     figure: str
     value: float | None
     low: float | None
@@ -132,6 +138,7 @@ def answering_commit(proof: Proof) -> str:
 
 
 def seeds(proof: Proof) -> str:
+    """First and last seed of the cases, as text: "1 to 500"."""
     return f"{proof.plan.seed} to {proof.plan.seed + proof.plan.cases - 1}"
 
 

@@ -23,6 +23,8 @@ POSITION_NOISE_M, POSITION_STEP_M = 4e-6, 1e-5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
+    """Parameters of a simulated accelerometer and its faults; by default it has no fault."""
+
     bandwidth_hz: float = BANDWIDTH_HZ
     """One pole."""
     orientation: FloatArray = field(default_factory=lambda: np.eye(3))

@@ -19,6 +19,8 @@ UNSCORED = "Nothing was scored, and nothing written."
 
 @dataclass(frozen=True, slots=True)
 class KitScore:
+    """Diagnoses of a lab's recordings compared with the sealed labels."""
+
     rows: tuple[Scored, ...]
     """One for every label, also of recordings without a diagnosis."""
     figures: tuple[Figure, ...]

@@ -35,6 +35,8 @@ from study.workflows.forked_map import map_forked
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RealDiagnosis:
+    """Answer of the diagnosis for a real recording, with its findings and input files."""
+
     answer: RealAnswer
     findings: Findings | None
     """None where the recording was refused."""

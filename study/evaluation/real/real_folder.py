@@ -56,6 +56,8 @@ class RealRecording:
 
 @dataclass(frozen=True, slots=True)
 class RealFolder:
+    """Recordings found in a folder, and the sub-folders that could not be used."""
+
     recordings: tuple[RealRecording, ...]
     troubles: tuple[Trouble, ...]
 

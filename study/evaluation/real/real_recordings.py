@@ -57,6 +57,9 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True)
 class RealPlan:
+    """Order of `diagnose_folder`: folder of recordings, folder for the results, limit of the search, faults to
+    inject."""
+
     folder: Path
     out: Path
     seconds: float | None = None

@@ -9,6 +9,8 @@ from study.evaluation.real.write_real import WrittenReal
 
 
 def real_lines(done: WrittenReal) -> tuple[str, ...]:
+    """Lines for the terminal: an answer per recording, what could not be used, injected faults, and the paths
+    written."""
     results = done.results
     troubles = tuple(f"Could not be used: {trouble.where}: {trouble.why}" for trouble in results.troubles)
     figures = injected_figures(results.injected) if results.injected else ()

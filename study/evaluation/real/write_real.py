@@ -54,6 +54,8 @@ class InjectedRow:
 
 @dataclass(frozen=True, slots=True)
 class RealResults:
+    """Answers for a folder of real recordings, what could not be used, and outcomes of injected faults."""
+
     answers: tuple[RealAnswer, ...]
     troubles: tuple[Trouble, ...]
     injected: tuple[InjectedOutcome, ...] = ()
@@ -61,6 +63,8 @@ class RealResults:
 
 @dataclass(frozen=True, slots=True)
 class WrittenReal:
+    """Results for a folder of real recordings, and the paths of page and table that were written."""
+
     results: RealResults
     page: Path
     table: Path

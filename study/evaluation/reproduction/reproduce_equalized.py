@@ -37,6 +37,8 @@ class PlacedModels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EqualizedPlayback:
+    """Responses measured with and without equalization, for the figure and its table."""
+
     rows: EqualizedRows
     others: tuple[PlayedResponse, ...]
     """Rows of the table only."""

@@ -29,6 +29,8 @@ class RecordingRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CachedRecording:
+    """A recording of the reproduction and its file, loaded or just made."""
+
     path: Path
     recording: Recording
     warnings: tuple[str, ...]

@@ -30,6 +30,8 @@ class ReproducedProtocols:
 
 @dataclass(frozen=True, slots=True)
 class ReproductionPlan:
+    """Order of a reproduction: output folder, number of participants, seed, and settings of the identified models."""
+
     out: Path
     subjects: int = 10
     seed: int = 1

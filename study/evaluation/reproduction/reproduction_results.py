@@ -14,6 +14,8 @@ from study.evaluation.reproduction.reproduce_equalized import EqualizedPlayback
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Results:
+    """Results of all steps of a reproduction, from which document, figures and page are made."""
+
     study: StudyAnalysis
     ellipsoids: tuple[EllipsoidResult, ...]
     device: MeasuredDevice

@@ -30,6 +30,8 @@ PAGE_NAME = "report.html"
 
 @dataclass(frozen=True, slots=True)
 class WrittenReproduction:
+    """Result of a reproduction, with the paths of document and page that were written."""
+
     reproduction: Reproduction
     lines: tuple[str, ...]
     """One per figure, for a terminal."""

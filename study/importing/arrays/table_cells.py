@@ -24,11 +24,14 @@ _BRACKETED = re.compile(r"[\[(].*[\])]")
 
 
 def is_comment(line: str) -> bool:
+    """Whether a line begins with # or %, and not with an error value of a spreadsheet, such as `#N/A`."""
     begin = line.lstrip()
     return begin.startswith(COMMENTS) and not begin[:_LONGEST_ERROR].lower().startswith(_ERRORS)
 
 
 def split_row(line: str, delimiter: str) -> list[str]:
+    """Split a line into stripped fields; none for an empty line. With a blank as delimiter `force [N]` stays
+    together."""
     if not line:
         return []
     if delimiter == " " and '"' not in line:
@@ -54,6 +57,7 @@ def is_number(field: str, decimal: str) -> bool:
 
 
 def is_empty(field: str) -> bool:
+    """Whether a field is empty or stands for a missing value, such as `nan` or `n/a`, in upper or lower case."""
     return field.lower() in EMPTY
 
 
@@ -97,6 +101,7 @@ def are_numbers(fields: Sequence[str], decimal: str, texts: Collection[int] = ()
 
 
 def holds_number(fields: Sequence[str], decimal: str) -> bool:
+    """Whether any field is a number; fields that stand for a missing value do not count."""
     return any(not is_empty(field) and is_number(field, decimal) for field in fields)
 
 

@@ -36,6 +36,8 @@ _BRACKETED = re.compile(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\[\]()]*[\])]")
 
 @dataclass(frozen=True, slots=True)
 class TableLayout:
+    """How a text table is read: delimiter, decimal sign, names of the columns, and the rows of data."""
+
     delimiter: str
     decimal: str
     names: tuple[str, ...]

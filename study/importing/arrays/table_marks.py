@@ -27,6 +27,8 @@ NO_THOUSANDS = "write numbers without signs between thousands"
 
 @dataclass(frozen=True, slots=True)
 class TableMarks:
+    """Delimiter and decimal sign of a text table."""
+
     delimiter: str
     decimal: str
     texts: frozenset[int] = frozenset()

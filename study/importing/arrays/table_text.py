@@ -25,6 +25,8 @@ _SHOWN = 24
 
 @dataclass(frozen=True, slots=True)
 class TableText:
+    """Decoded text of a table's file."""
+
     text: str
     note: str
     """A sentence where the encoding was detected from words; else empty."""

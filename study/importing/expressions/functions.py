@@ -20,6 +20,8 @@ class Clock(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Function:
+    """A function of expressions, with the fewest and most arguments that it takes."""
+
     usage: str
     meaning: str
     fewest: int

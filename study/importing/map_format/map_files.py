@@ -11,6 +11,8 @@ from study.importing.map_format.map_errors import ImportProblemError
 
 @dataclass(frozen=True, slots=True)
 class PartFiles:
+    """Files of a part of the recording: a path for each clock of the map."""
+
     part: PartMap
     by_clock: Mapping[str, Path]
 

@@ -16,6 +16,8 @@ STEP_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Moment:
+    """A moment of the log, by wall clock and monotonic clock."""
+
     utc: str
     """ISO 8601; empty where nothing was logged before."""
     monotonic_s: float | None = None

@@ -15,6 +15,8 @@ from study.session.views.forms import form_of
 
 @dataclass(frozen=True, slots=True)
 class FillIn:
+    """A form must be filled in."""
+
     form: Form
 
 
@@ -30,6 +32,8 @@ class Demonstrate:
 
 @dataclass(frozen=True, slots=True)
 class Rest:
+    """An enforced rest before the next trial."""
+
     seconds: float
 
 

@@ -17,6 +17,8 @@ STRONGEST_WEIGHT_HZ = 12.5
 
 @dataclass(frozen=True, slots=True)
 class ProbingState:
+    """State of the probes and references of a session, as far as they decide what is due next."""
+
     played: int = 0
     """Number of probes in the session, of all kinds."""
     with_hand: int = 0

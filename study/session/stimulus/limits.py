@@ -23,6 +23,8 @@ that of a sine. Above a quarter, consecutive samples of opposite sign change by 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
+    """Limits that the device's safety layer enforces: caps of the forces, slew rate, and times."""
+
     stimulus_cap_n: float
     total_cap_n: float
     slew_n_per_s: float

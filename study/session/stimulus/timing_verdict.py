@@ -65,6 +65,7 @@ def lateness_of(late_s: FloatArray, rate_hz: float) -> Lateness:
 
 
 def judge_lateness(lateness: Lateness, simulated: bool) -> DeviceFinding:
+    """Verdict on the wake-ups. Too late is only a warning for a simulated device."""
     value = (
         f"half of the wake-ups within {lateness.median_ms:.2f} ms, 99 % within {lateness.p99_ms:.2f} ms, "
         f"the latest {lateness.longest_ms:.1f} ms"

@@ -33,6 +33,8 @@ class SessionLine:
 
 @dataclass(frozen=True, slots=True)
 class ProtocolLine:
+    """A protocol as a line of the start screen."""
+
     name: str
     """Name or path, as `--protocol` takes it."""
     title: str

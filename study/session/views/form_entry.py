@@ -27,6 +27,8 @@ class FieldEntry:
 
 @dataclass(frozen=True, slots=True)
 class FormEntry:
+    """State of a form while it is filled in; each key gives a new state, see `press`."""
+
     form: Form
     given: tuple[FieldEntry, ...]
     """In the order of the form's fields."""

@@ -9,6 +9,8 @@ from enum import Enum
 
 
 class FormKind(Enum):
+    """Kinds of forms, each shown at its own point of a sitting."""
+
     CONSENT = "consent"
     EXCLUSION = "exclusion"
     QUESTIONNAIRE = "questionnaire"
@@ -29,6 +31,8 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class FormField:
+    """A question of a form: a choice, a number (with `limits`), or free text."""
+
     key: str
     """Names the answer in the log."""
     label: str
@@ -45,6 +49,9 @@ class FormField:
 
 @dataclass(frozen=True, slots=True)
 class Form:
+    """A form as it is shown, in the participant's language. version, ethics_id: as stated by the protocol, for the
+    log."""
+
     kind: FormKind
     title: str
     introduction: str
@@ -55,6 +62,8 @@ class Form:
 
 @dataclass(frozen=True, slots=True)
 class FormReply:
+    """Answers to a form as they were given, in the language shown; `coded` converts them to what is kept."""
+
     answers: dict[str, str]
     """Answers by the keys of their fields."""
 

@@ -25,6 +25,8 @@ HANDS = {"right": "hand_right", "left": "hand_left"}
 
 @dataclass(frozen=True, slots=True)
 class FormOutcome:
+    """Evaluation of a filled form: whether the person may go on, and what is logged."""
+
     passed: bool
     kept: dict[str, str]
     """Answers that go into the log, in codes that do not depend on the language."""

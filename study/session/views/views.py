@@ -110,6 +110,8 @@ class DemoMenu:
 
 @dataclass(frozen=True, slots=True)
 class PlayDemo:
+    """Choice in the demonstration menu: direction `number` (1 or 2) at vibration `vibration` (from 1, the slowest)."""
+
     vibration: int
     number: int
 
@@ -145,6 +147,8 @@ class DeviceFinding:
 
 @dataclass(frozen=True, slots=True)
 class DeviceReport:
+    """Findings of a device check; simulated: nothing moves."""
+
     device: str
     simulated: bool
     findings: tuple[DeviceFinding, ...]
@@ -183,6 +187,8 @@ class PracticeResult:
 
 @dataclass(frozen=True, slots=True)
 class PauseNotice:
+    """What the participant sees during a pause."""
+
     reason: str
     """Who asked, or what happened: shown to the participant."""
     answers: int
@@ -190,6 +196,8 @@ class PauseNotice:
 
 
 class AfterPause(Enum):
+    """The participant's decision that ends a pause."""
+
     GO_ON = "go_on"
     LEAVE = "leave"
     """The session can be resumed."""
@@ -199,6 +207,8 @@ class AfterPause(Enum):
 
 @dataclass(frozen=True, slots=True)
 class RestNotice:
+    """What the participant sees during an enforced rest: its length, the runs left, and the progress."""
+
     seconds: float
     runs_left: int
     progress: Progress | None = None
@@ -206,6 +216,8 @@ class RestNotice:
 
 @dataclass(frozen=True, slots=True)
 class Goodbye:
+    """Last notice of a sitting. finished: the whole session, not only this sitting."""
+
     finished: bool
     answers: int
     reason: str = ""
@@ -216,6 +228,8 @@ class Goodbye:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
+    """The participant's answer, 1 or 2: number of the direction or interval. Raises ValueError for other numbers."""
+
     answer: int
     at_s: float
     """Clock time at which the key arrived."""
@@ -244,5 +258,7 @@ Reply = Answered | Unanswered
 
 
 def picture_of(directions: TestDirections, swapped: bool) -> DirectionPicture:
+    """Picture of the two directions, 45 degrees to either side of the symmetry axis. swapped: numbers 1 and 2 are
+    exchanged."""
     first, second = directions.symmetry_deg + 45.0, directions.symmetry_deg - 45.0
     return DirectionPicture(directions.plane, (second, first) if swapped else (first, second))

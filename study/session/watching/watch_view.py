@@ -19,6 +19,8 @@ RunStatus = Literal["done", "present", "to come"]
 
 @dataclass(frozen=True, slots=True)
 class WatchedRun:
+    """A run of the session's schedule and its progress, in counted trials and reversals."""
+
     run: int
     phase: str
     """training, practice, test or detection."""
@@ -57,6 +59,9 @@ class OpenTrial:
 
 @dataclass(frozen=True, slots=True)
 class ClosedTrial:
+    """A trial that was answered or is void. `shown` and `correct` are None for a void trial, and while it is
+    measured."""
+
     run: int
     trial: int
     attempt: int
@@ -97,6 +102,8 @@ class Exposure:
 
 @dataclass(frozen=True, slots=True)
 class PracticeLine:
+    """Result of a practice run: `right` of the last `of` answers were correct; passed: its criterion was met."""
+
     frequency_hz: float
     right: int
     of: int
@@ -105,6 +112,9 @@ class PracticeLine:
 
 @dataclass(frozen=True, slots=True)
 class FormLine:
+    """A form that was filled in, without its answers. passed: False where consent was not given or the person may not
+    take part."""
+
     utc: str
     form: str
     passed: bool
@@ -112,6 +122,9 @@ class FormLine:
 
 @dataclass(frozen=True, slots=True)
 class NoteLine:
+    """A note of the session's log. who: participant, experimenter or program; adverse: about an adverse event, such as
+    pain."""
+
     utc: str
     who: str
     text: str
@@ -131,6 +144,8 @@ class DriftLine:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
+    """An alert for the experimenter: a state that lasts, or a single event of the followed session."""
+
     kind: str
     sentence: str
     """What is wrong, and what to do."""
@@ -144,6 +159,8 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class WatchView:
+    """The complete view of a followed session at a moment, from which screens and lines for watchers are made."""
+
     utc: str
     """When this was true."""
     session: str

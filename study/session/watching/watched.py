@@ -40,6 +40,8 @@ class PlayedProbe:
 
 @dataclass(frozen=True, slots=True)
 class Watched:
+    """A followed session: the state folded from its log, and facts that only a watcher needs."""
+
     state: SessionState
     remarks: tuple[str, ...]
     """One for each of `state.trials`: its flags, or why it is void."""

@@ -44,6 +44,7 @@ def next_level_n(state: SessionState, shown: int | None) -> float | None:
 
 
 def run_line(state: SessionState, run: Run) -> WatchedRun:
+    """A run of the schedule with its status; trials and reversals are counted over its trials that count."""
     counted, rule = _select_counted(state, run.index), state.protocol.staircase
     return WatchedRun(
         run=run.index,
@@ -57,6 +58,7 @@ def run_line(state: SessionState, run: Run) -> WatchedRun:
 
 
 def open_trial(state: SessionState, presented_s: float) -> OpenTrial | None:
+    """The presented trial without an answer; None if there is none. presented_s: seconds since its presentation."""
     shown = state.presented
     if shown is None or state.answered is not None or state.closed:
         return None
@@ -105,6 +107,7 @@ def _close_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
 
 
 def practice(state: SessionState) -> tuple[PracticeLine, ...]:
+    """Results of the practice runs before the current run."""
     settings, lines = state.protocol.practice, []
     for run in state.runs[: state.run]:
         if run.practice:

@@ -97,6 +97,7 @@ def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
 
 
 def csv_line(fields_of_row: Sequence[str]) -> str:
+    """A row of CSV without the line end; fields are quoted where needed."""
     text = io.StringIO()
     # Only the characters of its own line end make the writer quote a field: with both, a carriage return is safe.
     csv.writer(text, lineterminator="\r\n").writerow(fields_of_row)

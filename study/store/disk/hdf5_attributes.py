@@ -60,6 +60,7 @@ def text_or_list(texts: tuple[str, ...]) -> str | tuple[str, ...]:
 
 
 def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
+    """Write an attribute of an HDF5 object: a text, or a list of texts."""
     if isinstance(texts, str):
         owner.attrs[name] = texts
     else:

@@ -50,6 +50,7 @@ class Problems:
 
 
 def is_hdf5(path: Path) -> bool:
+    """Whether the path is an HDF5 file, by its content; False where no file exists."""
     return path.is_file() and bool(h5py.is_hdf5(path))
 
 

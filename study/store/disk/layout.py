@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Entry:
+    """An entry of a file format: name, type and meaning."""
+
     name: str
     holds: str
     """Type and shape."""

@@ -27,6 +27,8 @@ class Parent:
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
+    """Origin of a result, as it is written into the result's file."""
+
     versions: Mapping[str, str]
     command: tuple[str, ...]
     """As typed, with paths reduced to file names."""
@@ -78,6 +80,7 @@ def as_text(name: str) -> str:
 
 
 def sha256_of(path: Path) -> str:
+    """SHA-256 of a regular file's content, in hexadecimal. Raises CannotReadError."""
     try:
         with open_regular(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

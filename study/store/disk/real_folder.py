@@ -21,6 +21,8 @@ def is_real_file(path: Path) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class RealFolder:
+    """A folder held open; its entries are reached by its descriptor, where the system can."""
+
     path: Path
     descriptor: int | None
     """None on systems without paths relative to a descriptor (Windows)."""

@@ -23,6 +23,8 @@ class FilledForm:
 
 @dataclass(frozen=True, slots=True)
 class AnswerColumn:
+    """A question of the protocol as a column of the table."""
+
     table: str
     """The protocol's table of questions: before or debrief."""
     question: Question
@@ -49,6 +51,8 @@ class AnswerColumn:
 
 @dataclass(frozen=True, slots=True)
 class AnswerTable:
+    """Answers to the protocol's questions: a row per session, a column per question."""
+
     columns: tuple[AnswerColumn, ...] = ()
     rows: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
     """Subject, session, and an answer for each column, empty where none was given."""

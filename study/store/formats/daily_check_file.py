@@ -13,6 +13,8 @@ FORMAT, VERSION = "hapteq-daily-check", 1
 
 @dataclass(frozen=True, slots=True)
 class DailyCheck:
+    """Content of a daily check's file."""
+
     device: str
     details: str
     """Serial number, firmware and SDK."""

@@ -48,6 +48,7 @@ class ExportedTrials:
 
 
 def is_psych_ds(folder: Path) -> bool:
+    """Whether the folder contains the description and the protocol of an exported Psych-DS dataset."""
     return (folder / DESCRIPTION_NAME).is_file() and (folder / PROTOCOL_NAME).is_file()
 
 

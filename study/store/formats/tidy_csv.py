@@ -21,6 +21,7 @@ KIND = "table of exported trials"
 
 
 def is_tidy_csv(folder: Path) -> bool:
+    """Whether the folder contains all four files of an export as CSV."""
     return all((folder / name).is_file() for name in (TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME))
 
 

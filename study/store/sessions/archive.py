@@ -17,6 +17,8 @@ TOMBSTONE_NAME = "withdrawn.json"
 
 @dataclass(frozen=True, slots=True)
 class SessionFolder:
+    """Folder of a session, named by participant code and number, and the paths of its files."""
+
     path: Path
 
     @property

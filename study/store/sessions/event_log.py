@@ -75,6 +75,8 @@ class EventLog:
 
 @dataclass(frozen=True, slots=True)
 class LogContents:
+    """Content of a session's log: its events, and an incomplete last line apart from them."""
+
     events: tuple[Event, ...]
     torn: str
     """An incomplete last line, left by a crash; empty if there is none."""

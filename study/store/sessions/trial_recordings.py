@@ -16,6 +16,8 @@ PROBE_PREFIX = "probe-"
 
 @dataclass(frozen=True, slots=True)
 class SavedRecording:
+    """A recording in a session's folder, and its hash for the log."""
+
     name: str
     """Relative to the session folder."""
     sha256: str

@@ -37,6 +37,8 @@ ADVICE = (
 
 @dataclass(frozen=True, slots=True)
 class BareLoop:
+    """Result of a timed loop in C, with which the device's loop is compared."""
+
     ticks: int
     late_ticks: int
     """Ticks whose work ended after the next was due, missed ones included."""

@@ -31,6 +31,8 @@ ROOM_BYTES = 10**9
 
 @dataclass(frozen=True, slots=True)
 class Terminal:
+    """Properties of the terminal that the check of the installation judges."""
+
     encoding: str
     kind: str
     """Value of the environment variable TERM."""

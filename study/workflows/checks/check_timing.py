@@ -33,6 +33,8 @@ latest."""
 
 @dataclass(frozen=True, slots=True)
 class Timing:
+    """Result of `check_timing`: lateness of the device's loop and of the program's wake-ups."""
+
     seconds: float
     health: Health
     """Lateness of the device's own loop."""

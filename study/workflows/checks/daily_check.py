@@ -46,11 +46,14 @@ class Moving:
 
 @dataclass(frozen=True, slots=True)
 class CheckedToday:
+    """Findings of today's check, and the file to which they were written."""
+
     findings: tuple[DeviceFinding, ...]
     file: Path
 
 
 def seconds_of_play() -> float:
+    """Total duration (s) of what a baseline or daily check plays."""
     return RecordingPlan(_protocol(), "", (0.0, 0.0, 0.0), 1, Path()).total_s
 
 

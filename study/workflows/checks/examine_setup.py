@@ -33,6 +33,8 @@ SPARE_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Examination:
+    """Findings about installation, device and timing of a computer."""
+
     installation: tuple[DeviceFinding, ...]
     device: DeviceReport
     timing: Timing | None

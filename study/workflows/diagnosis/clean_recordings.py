@@ -14,6 +14,8 @@ NOT_ALIKE = "Give clean recordings of the same device, with the same channels, u
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WithClean:
+    """Input of a diagnosis and its clean reference, reduced to the signals that both have."""
+
     found: DiagnosisInput
     clean: DiagnosisInput
 

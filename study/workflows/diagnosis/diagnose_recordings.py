@@ -45,6 +45,8 @@ TWIN_REMARK = (
 
 @dataclass(frozen=True, slots=True)
 class DiagnosePlan:
+    """Order of a diagnosis: input files, output folder, and the options of `hapteq diagnose`."""
+
     sources: tuple[Path, ...]
     """Recordings, or one session's folder."""
     out: Path
@@ -69,6 +71,8 @@ class DiagnosePlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DiagnosedRecordings:
+    """Findings of a diagnosis, and the folder into which its report was written."""
+
     findings: Findings
     out: Path
 
@@ -84,6 +88,9 @@ class Answer:
 
 
 class Engine(Protocol):
+    """Signature of the function that diagnoses recordings against a model; by default
+    `analysis.diagnosis.diagnose.diagnose`."""
+
     def __call__(
         self,
         recordings: Sequence[Recording],

@@ -20,6 +20,8 @@ Checked = TypeVar("Checked")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DiagnosisInput:
+    """Recordings for a diagnosis, in the form in which they can be compared, and facts about their source."""
+
     recordings: tuple[Recording, ...]
     names: tuple[str, ...]
     parents: tuple[Path, ...]

@@ -23,6 +23,9 @@ TITLE = "The model was not made"
 
 @dataclass(frozen=True, slots=True)
 class FirstModelPlan:
+    """Order of `fit_first_model`: recordings, model file to write, and a structure's name; "auto" chooses the
+    structure."""
+
     recordings: tuple[Path, ...]
     out: Path
     structure: str = "auto"
@@ -32,6 +35,8 @@ class FirstModelPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstModel:
+    """A mechanical model that was fitted and written to `plan.out`, and how its structure was chosen."""
+
     plan: FirstModelPlan
     choice: Choice
     remarks: tuple[str, ...]

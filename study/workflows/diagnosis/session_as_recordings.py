@@ -41,6 +41,8 @@ TESTED_OF = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionRecordings:
+    """Trials of a session, joined to a recording for the diagnosis."""
+
     recording: Recording
     name: str
     parents: tuple[Path, ...]

@@ -17,6 +17,8 @@ from study.workflows.results.session_drift import DriftReader
 
 @dataclass(frozen=True, slots=True)
 class SessionReferences:
+    """Recordings of a session's references (without a hand), to be diagnosed instead of its trials."""
+
     log: Path
     paths: tuple[Path, ...]
     remarks: tuple[str, ...]

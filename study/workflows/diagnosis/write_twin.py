@@ -42,6 +42,8 @@ LOWER_LEVEL = 0.6
 
 @dataclass(frozen=True, slots=True)
 class TwinPlan:
+    """Order of `write_twin`: model file to write, device to record, recording protocol, band, calibration."""
+
     out: Path
     device: str = "simulated"
     seed: int = 1
@@ -62,6 +64,8 @@ class TwinPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrittenTwin:
+    """A mechanical model that was identified from recordings of a device and written, and the fit it comes from."""
+
     plan: TwinPlan
     model: MechanicalModel
     """The model as written."""

@@ -21,6 +21,8 @@ ANALYSE = "Give the anova.json that `hapteq analyze` writes for a study with two
 
 @dataclass(frozen=True, slots=True)
 class BandOfStudy:
+    """A frequency band that ends at the direction limit found by a study."""
+
     band_hz: tuple[float, float]
     told: str
     """Where the upper end comes from, in a sentence."""

@@ -30,6 +30,9 @@ NO_WEIGHT = 1e-7
 
 @dataclass(frozen=True, slots=True)
 class EqualizePlan:
+    """Order of an equalization: files of identified models, table of wanted accelerations, table of forces to write.
+    at_m: place in the workspace (m); constrain: keep the forces below the cap instead of refusing."""
+
     models: tuple[Path, ...]
     trajectory: Path
     out: Path
@@ -43,6 +46,8 @@ class EqualizePlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EqualizedTrajectory:
+    """Forces computed for a wanted trajectory, and the models and solution they come from."""
+
     plan: EqualizePlan
     wanted: Trajectory
     forces: Trajectory

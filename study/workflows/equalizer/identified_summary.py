@@ -28,6 +28,7 @@ def summary(device: IdentifiedDevice) -> dict[str, Any]:
 
 
 def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
+    """The summary as lines for the terminal."""
     found = summary(device)
     low, high = found["band_hz"]
     lines = [

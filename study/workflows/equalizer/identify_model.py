@@ -33,6 +33,8 @@ NEAR_M = 0.001
 
 @dataclass(frozen=True, slots=True)
 class IdentifyPlan:
+    """Order of `identify_model`: recordings, model file to write, band, order of the model, and options."""
+
     recordings: tuple[Path, ...]
     out: Path
     band_hz: tuple[float, float] = (5.0, 35.0)

@@ -34,6 +34,8 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelsForPlaying:
+    """Identified models read from files and combined for a place in the workspace."""
+
     given: tuple[IdentifiedModel, ...]
     at: ModelsAtPlace
     """For two bands: the narrow model only."""

@@ -56,6 +56,8 @@ SETTLE_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ContactPlan:
+    """Order of `play_contact`: model, table of the recorded transient, normal of the contact, new folder, device."""
+
     model: Path
     transient: Path
     normal: Vector

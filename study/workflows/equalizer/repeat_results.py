@@ -20,6 +20,9 @@ from study.store.formats.trajectory_file import read_trajectory, write_trajector
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RepeatPlan:
+    """Order of repeated playback: wanted signal, inverse of the model, settings of the device, number of
+    corrections."""
+
     wanted: Trajectory
     """Accelerations, from rest to rest; only their part in the band is played."""
     inverse: InverseOfLength
@@ -44,6 +47,8 @@ class RepeatPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Repeated:
+    """Result of repeated playback: the best forces, and the error of each play."""
+
     forces: Trajectory
     """The best forces, one to one with the wanted signal."""
     errors: tuple[float, ...]
@@ -126,6 +131,7 @@ def earlier_forces(forces: Path, wanted: Trajectory, model_sha256: str) -> Float
 
 
 def trajectory_sha256(wanted: Trajectory) -> str:
+    """SHA-256 of sample rate and samples: forces of an earlier run are reused for the same trajectory only."""
     rate = np.float64(wanted.signal.sample_rate_hz).tobytes()
     return hashlib.sha256(rate + wanted.signal.samples.astype("<f8").tobytes()).hexdigest()
 

@@ -50,6 +50,8 @@ class RepeatOrder:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RepeatedTrajectory:
+    """Result of `repeat_trajectory`: the solution from the models, and the forces corrected by repeated playback."""
+
     solved: EqualizedTrajectory
     order: RepeatOrder
     repeated: Repeated

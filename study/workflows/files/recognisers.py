@@ -41,6 +41,8 @@ the content wrong."""
 
 
 def recognise_recording(content: FileContent) -> str | None:
+    """An HDF5 recording, by its format attribute. Raises UnusableFileError also for the problems of
+    `silent_segments`."""
     if content.hdf5_format != recording_layout.FORMAT:
         return None
     found = read_recording(content.path)
@@ -88,6 +90,7 @@ def recognise_calibration(content: FileContent) -> str | None:
 
 
 def recognise_mechanical_model(content: FileContent) -> str | None:
+    """A mechanical model in TOML, by any of its top-level keys."""
     if content.toml is None or not content.toml.keys() & {"model", "sensor", "actuator", "effect", "tolerance"}:
         return None
     found = read_mechanical_model(content.path)
@@ -99,6 +102,7 @@ def recognise_mechanical_model(content: FileContent) -> str | None:
 
 
 def recognise_import_map(content: FileContent) -> str | None:
+    """An import map in TOML. Raises UnusableFileError also for unknown units."""
     if content.toml is None or not is_map(content.toml):
         return None
     found = parse_map(content.text or "", content.path)
@@ -121,6 +125,7 @@ _PROTOCOL_KEYS = {key for kind in ADAPTERS for key in protocol_schema(kind)["pro
 
 
 def recognise_protocol(content: FileContent) -> str | None:
+    """A study or recording protocol in TOML, by any of its top-level keys."""
     if not (content.toml or {}).keys() & _PROTOCOL_KEYS:
         return None
     try:
@@ -170,6 +175,7 @@ def recognise_reproduction(content: FileContent) -> str | None:
 
 
 def recognise_trajectory(content: FileContent) -> str | None:
+    """A CSV table of a trajectory, forces or a transient, by the first column of its header."""
     if content.header[:1] != TRAJECTORY.header[:1]:
         return None
     found = read_trajectory(content.path)
@@ -178,6 +184,7 @@ def recognise_trajectory(content: FileContent) -> str | None:
 
 
 def recognise_trials(content: FileContent) -> str | None:
+    """A CSV table of trials, by the first two columns of its header."""
     # A header with one wrong column is still one of ours; both tables begin with the subject.
     if content.header[:2] != TRIALS_HEADER[:2] and header_problem(content.header, TRIALS_HEADER):
         return None
@@ -185,6 +192,7 @@ def recognise_trials(content: FileContent) -> str | None:
 
 
 def recognise_thresholds(content: FileContent) -> str | None:
+    """A CSV table of thresholds, by the first two columns of its header."""
     if content.header[:2] != THRESHOLDS_HEADER[:2] and header_problem(content.header, THRESHOLDS_HEADER):
         return None
     what = "detection threshold" if content.path.name == DETECTION_NAME else "threshold"

@@ -57,6 +57,8 @@ def _describe_withdrawn(folder: SessionFolder, path: Path) -> str:
 
 
 def recognise_document(content: FileContent) -> str | None:
+    """Kind of a JSON document of `DOCUMENTS`; None for others. Raises UnusableFileError where a key is missing, and for
+    a withdrawal whose erasing is not finished."""
     if content.json_format not in DOCUMENTS:
         return None
     kind, needed = DOCUMENTS[content.json_format]
@@ -73,6 +75,7 @@ def recognise_document(content: FileContent) -> str | None:
 
 
 def recognise_lock(content: FileContent) -> str | None:
+    """A protocol's lock. Raises UnusableFileError where it cannot be parsed."""
     if content.json_format != LOCK_FORMAT:
         return None
     try:

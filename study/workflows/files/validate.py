@@ -29,6 +29,8 @@ KNOWN = (
 
 @dataclass(frozen=True, slots=True)
 class Validation:
+    """Result of the validation of a file or session folder."""
+
     path: Path
     kind: str
     """In words: "recording, 105 s at 1000 Hz, 3 commands, 3 responses"."""

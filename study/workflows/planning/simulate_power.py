@@ -35,6 +35,8 @@ FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
 
 @dataclass(frozen=True, slots=True)
 class PowerPlan:
+    """Order of `simulate_power`: simulated participants, staircase, sample sizes and number of studies."""
+
     crowd: Crowd
     rule: StaircaseRule
     people: tuple[int, ...]

@@ -36,6 +36,8 @@ SHOWN = 3
 
 @dataclass(frozen=True, slots=True)
 class CalibrationPlan:
+    """Order of `calibrate_linkage`: file to write, device, and size of the grid of positions."""
+
     out: Path
     device: str = "simulated"
     radius_m: float = 0.05
@@ -46,6 +48,8 @@ class CalibrationPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrittenCalibration:
+    """A calibration of a device's linkage that was written to `plan.out`."""
+
     plan: CalibrationPlan
     calibration: LinkageCalibration
     warnings: tuple[str, ...]

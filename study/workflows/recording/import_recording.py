@@ -44,6 +44,8 @@ class ImportPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imported:
+    """A recording that was imported and written to `path`."""
+
     path: Path
     recording: Recording
     map: str

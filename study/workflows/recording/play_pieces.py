@@ -102,4 +102,5 @@ def _once(device: Device, piece: Piece, on_share: Callable[[float], None]) -> tu
 
 
 def along_in_words(piece: Piece) -> str:
+    """The direction of a piece for a sentence: an axis, or "all axes"."""
     return "all axes" if piece.along == "all" else piece.along

@@ -42,6 +42,8 @@ class RecordingPlan:
 
 @dataclass(frozen=True, slots=True)
 class WrittenRecording:
+    """File of a recording, and warnings about its pieces."""
+
     path: Path
     warnings: tuple[str, ...]
 
@@ -119,6 +121,7 @@ def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[Take]) -
 
 
 def recording_settings(plan: RecordingPlan) -> DeviceSettings:
+    """Settings with which the device is opened for this recording."""
     return DeviceSettings(
         limits=limits_of_recording(plan.protocol),
         spring_frequency_hz=plan.protocol.spring.natural_frequency_hz,

@@ -11,6 +11,8 @@ from study.store.sessions.archive import SessionFolder
 
 @dataclass(frozen=True, slots=True)
 class Collected:
+    """Trials that are analysed together, all of the same protocol, and facts about their sessions."""
+
     protocol: StudyProtocol
     protocol_hash: str
     trials: tuple[Trial, ...]

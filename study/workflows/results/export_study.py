@@ -32,6 +32,8 @@ WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Exported:
+    """Result of an export: its folder, files and number of trials."""
+
     out: Path
     files: tuple[str, ...]
     """Relative to `out`."""

@@ -21,6 +21,8 @@ from study.store.sessions.session_summary import SUMMARY_NAME, closed_and_presen
 
 @dataclass(frozen=True, slots=True)
 class FoldedSession:
+    """A session read from its log: its state and the log's content."""
+
     state: SessionState
     contents: LogContents
     sealed_lines: int

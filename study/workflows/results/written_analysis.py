@@ -10,6 +10,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class WrittenAnalysis:
+    """Thresholds of an analysis, and the path of the report that was written."""
+
     thresholds: "tuple[Threshold, ...]"
     table: tuple[str, ...]
     """Group means by frequency, as lines of text."""

@@ -55,6 +55,8 @@ class Participant:
 
 @dataclass(frozen=True, slots=True)
 class Conducted:
+    """How a sitting ended: the session's state, and why it was left."""
+
     folder: SessionFolder
     state: SessionState
     left: str

@@ -42,6 +42,8 @@ class SessionPlan:
 
 @dataclass(frozen=True, slots=True)
 class OpenedSession:
+    """A locked session: its folder, its log open for appending, and its state."""
+
     folder: SessionFolder
     log: EventLog
     state: SessionState
@@ -91,6 +93,7 @@ def open_session(plan: SessionPlan, device: DeviceInfo, equalized: Equalized, cl
 
 
 def device_facts(info: DeviceInfo) -> DeviceFacts:
+    """Facts about the device, as the log keeps them when a session is opened or resumed."""
     return DeviceFacts(
         name=info.name, simulated=info.simulated, sample_rate_hz=info.sample_rate_hz, details=info.details
     )

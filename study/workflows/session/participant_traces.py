@@ -33,6 +33,8 @@ TEXTS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".p
 
 @dataclass(frozen=True, slots=True)
 class Traces:
+    """What was found of a participant in a data folder."""
+
     sessions: tuple[str, ...]
     """Names of the session folders proved to be the participant's."""
     derived: tuple[str, ...]

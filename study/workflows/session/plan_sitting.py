@@ -51,6 +51,8 @@ def _can_go_on(folder: SessionFolder, protocol: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class SittingPlan:
+    """Plan of a new session, and remarks about it."""
+
     session: SessionPlan
     notes: tuple[str, ...]
     """Remarks before the session begins."""

@@ -92,10 +92,12 @@ def _rehearse_elsewhere(rehearsal: Rehearsal, executor: Executor, on_finished: C
 
 
 def subject_code(number: int) -> str:
+    """Participant code of a simulated participant; `number` counts from 0, the code from S001."""
     return f"S{number + 1:03d}"
 
 
 def codes(subjects: int) -> set[str]:
+    """Codes of this many simulated participants."""
     return {subject_code(number) for number in range(subjects)}
 
 

@@ -101,6 +101,7 @@ def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFol
 
 
 def already_finished(state: SessionState, folder: SessionFolder) -> StudyError:
+    """Error for a closed session that cannot be resumed."""
     return StudyError(
         "This session is finished",
         f"{folder.name} has all its runs.",

@@ -36,6 +36,8 @@ faulty. A stimulus must not play on an unattended handle."""
 
 @dataclass(frozen=True, slots=True)
 class SessionEnd:
+    """State at the end of a sitting, and why it ended."""
+
     state: SessionState
     left: str
     """Why the sitting ended before the session was finished; empty if it is finished."""

@@ -39,6 +39,8 @@ CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
 
 
 class SimulatedDisplay:
+    """Display of a simulated participant: answers come from the observer, and waiting passes on the clock."""
+
     def __init__(
         self,
         observer: Observer,

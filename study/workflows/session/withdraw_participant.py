@@ -26,6 +26,8 @@ ELSEWHERE = "Analyses written elsewhere with --out, and copies, still hold the n
 
 @dataclass(frozen=True, slots=True)
 class Withdrawal:
+    """What a withdrawal erases in a data folder, and what remains to be checked."""
+
     subject: str
     sessions: tuple[str, ...]
     """All sessions of the participant in this data folder, earlier withdrawn ones included."""

@@ -22,6 +22,8 @@ HOW_TO_USE = (
 
 @dataclass(frozen=True, slots=True)
 class NoisePlan:
+    """Length, band (Hz) and seed of masking noise."""
+
     minutes: float
     """Rounded to whole seconds."""
     low_hz: float

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AfterTrial:
+    """State after a trial or a wait, and how the sitting goes on."""
+
     state: SessionState
     correct: bool | None = None
     """None for a void trial, and where nothing was asked."""

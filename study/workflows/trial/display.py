@@ -35,6 +35,8 @@ False: something ended the wait (a fault, a request, a device button); return at
 
 
 class Display(Protocol):
+    """Interface of the participant's screen: shows notices, forms and questions, and waits for the replies."""
+
     def fill_in(self, form: Form) -> FormReply:
         """Show a form. Returns when every required field has an answer that is one of its choices."""
         ...

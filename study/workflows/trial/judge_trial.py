@@ -10,6 +10,8 @@ from study.session.facts.void_reasons import ACCELERATION_MISSING, TICK_HELD, TI
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
+    """Verdict on an answered trial: whether it counts, and remarks on it."""
+
     spoiled: str
     """Why the trial is void; empty if it counts."""
     flags: tuple[str, ...]

@@ -65,6 +65,7 @@ def was_masked(sitting: Sitting) -> bool:
 
 
 def stop_masking(state: SessionState, sitting: Sitting) -> SessionState:
+    """Stop the masking noise and log it. The state is unchanged if there was nothing to stop."""
     if sitting.sound is None or not sitting.sound.stop():
         return state
     return _log(state, sitting, sitting.sound, playing=False)

@@ -7,6 +7,8 @@ from study.session.watching.requests import Request
 
 
 class Requests(Protocol):
+    """Interface of a source of requests to a running session."""
+
     def take(self) -> tuple[Request, ...]:
         """New requests since the last call, oldest first. Fast: called about twenty times a second. Never raises."""
         ...

@@ -51,6 +51,8 @@ def no_pulse() -> None:
 
 @dataclass(frozen=True, slots=True)
 class Sitting:
+    """Ports of a sitting: the session's folder and log, clock, device, display, and optional trigger line and sound."""
+
     folder: SessionFolder
     log: EventLog
     clock: Clock
@@ -77,6 +79,7 @@ def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
 
 
 def tell_clock_steps(steps: tuple[ClockStep, ...], sitting: Sitting) -> None:
+    """Tell the experimenter of each step of the wall clock, see `tell`."""
     for step in steps:
         tell(step.sentence, sitting)
 

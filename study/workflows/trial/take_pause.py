@@ -10,6 +10,8 @@ from study.workflows.trial.sitting import Sitting, record, write_notes
 
 @dataclass(frozen=True, slots=True)
 class PauseOutcome:
+    """State after a pause, and whether the sitting goes on."""
+
     state: SessionState
     leave: str
     """Why the sitting ends here; empty where it goes on."""
@@ -20,6 +22,8 @@ LEAVE = {AfterPause.LEAVE: "the participant left", AfterPause.WITHDRAW: "the par
 
 
 def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutcome:
+    """Show the pause until the participant decides, and log it with its duration. Notes are logged meanwhile. reason:
+    shown to the participant."""
     supervisor = sitting.supervisor
     who = supervisor.pause_asked or "participant"
     supervisor.begin("pause")

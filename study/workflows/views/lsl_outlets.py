@@ -24,6 +24,8 @@ class Described:
 
 
 class SignalOutlet(Protocol):
+    """An LSL outlet of a stream of samples."""
+
     def push(self, samples: FloatArray, at_s: FloatArray) -> None:
         """samples (n, channels); at_s (n,): on LSL's clock."""
         ...
@@ -76,6 +78,7 @@ def source_id(log: Path) -> str:
 
 
 def not_followed_error(log: Path, problem: Exception) -> StudyError:
+    """Error for a log that cannot be read while a session is followed."""
     return StudyError(
         "The session's log cannot be followed",
         f"{log.name} in {log.parent.name}: {problem}.",

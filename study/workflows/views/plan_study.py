@@ -25,6 +25,8 @@ BEST_FIRST = ("finished", "running", "unfinished")
 
 @dataclass(frozen=True, slots=True)
 class PlannedStudy:
+    """Plan of a study with the sessions begun so far, and the code of the next participant."""
+
     plan: StudyPlan
     next_code: str
     """A free code in the style of the latest one."""

@@ -50,6 +50,7 @@ def with_writer(line: SessionLine, folder: SessionFolder) -> SessionLine:
 
 
 def line_of(state: SessionState, folder: SessionFolder) -> SessionLine:
+    """The session as a line of a list, from its folded log; never `running`, see `with_writer`."""
     opened = state.opened
     return SessionLine(
         name=folder.name,

@@ -39,6 +39,8 @@ LAST = "session_closed"
 
 
 class Outlet(Protocol):
+    """Interface of the LSL outlet of a session's markers."""
+
     def clock_s(self) -> float:
         """LSL's own clock."""
         ...

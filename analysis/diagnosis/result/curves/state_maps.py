@@ -29,6 +29,8 @@ NAMED, NOT_CONFIRMED = "with what is named", "with the best candidates, not conf
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StateView:
+    """The missing force against a state variable: single samples, and means per bin."""
+
     along: str
     """Name of the abscissa: "position"."""
     unit: str

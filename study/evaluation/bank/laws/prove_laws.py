@@ -22,6 +22,8 @@ LAWS = "laws"
 
 @dataclass(frozen=True, slots=True)
 class LawProof:
+    """Result of a bank of concealed laws, with its score."""
+
     folder: ProofFolder
     plan: BankPlan
     seal: str

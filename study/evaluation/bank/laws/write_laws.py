@@ -23,6 +23,8 @@ DOCUMENT, TABLE = "proof.json", "proof.csv"
 
 @dataclass(frozen=True, slots=True)
 class LawRow:
+    """A case of the bank of laws as a row of proof.csv and of the table of misses."""
+
     number: int
     seed: int
     kind: str

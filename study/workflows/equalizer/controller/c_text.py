@@ -24,10 +24,12 @@ def header_text(controller: RealtimeController, written_for: tuple[str, ...]) ->
 
 
 def example_text() -> str:
+    """C source of an example loop with the controller."""
     return _source(EXAMPLE)
 
 
 def check_text(cases: ControllerCases) -> str:
+    """C source of a program that checks the controller against these cases, which are set in as tables."""
     tables = (
         c_table("case_rotation", cases.rotations.reshape(len(cases), -1)),
         c_table("case_transient_force", cases.transient_forces),
@@ -40,6 +42,7 @@ def check_text(cases: ControllerCases) -> str:
 
 
 def c_table(name: str, values: npt.ArrayLike) -> str:
+    """C definition of a constant array of double with this name and the shape of `values`."""
     numbers = np.asarray(values, dtype=np.float64)
     return f"static const double {name}{''.join(f'[{size}]' for size in numbers.shape)} = {_c_initializer(numbers)};"
 

@@ -28,6 +28,8 @@ TRY = "Such as --preview 200 --cap 3."
 
 @dataclass(frozen=True, slots=True)
 class ControllerPlan:
+    """Order of `export_controller`: file of an identified model, new folder for the sources, and settings."""
+
     model: Path
     out: Path
     transient: Path | None = None
@@ -37,6 +39,8 @@ class ControllerPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExportedController:
+    """A controller whose C sources were written: header, example loop and check program in the folder `plan.out`."""
+
     plan: ControllerPlan
     model: IdentifiedModel
     controller: RealtimeController
@@ -78,6 +82,7 @@ def controller_settings(weight: float, preview_s: float, cap_n: float) -> Realti
 
 
 def exported_summary(exported: ExportedController) -> dict[str, Any]:
+    """The export as plain values, for one JSON document. Errors are relative, as predicted by the model itself."""
     controller, rate_hz = exported.controller, exported.model.sample_rate_hz
     return {
         "files": [str(path) for path in exported.files],
@@ -94,6 +99,7 @@ def exported_summary(exported: ExportedController) -> dict[str, Any]:
 
 
 def exported_warnings(exported: ExportedController) -> tuple[str, ...]:
+    """A warning if the controller's cap is above the force that hapteq plays with a hand on the handle; else empty."""
     cap_n = exported.controller.cap_n
     if cap_n <= HAND_STIMULUS_CAP_N:
         return ()
@@ -104,6 +110,8 @@ def exported_warnings(exported: ExportedController) -> tuple[str, ...]:
 
 
 def exported_lines(exported: ExportedController) -> tuple[str, ...]:
+    """Lines for the terminal: files, length of the transient, delay and predicted error of the stream, command of the
+    check."""
     found, (low_hz, high_hz) = exported_summary(exported), exported.model.band_hz
     return (
         *found["files"],
