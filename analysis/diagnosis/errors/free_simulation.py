@@ -43,7 +43,7 @@ class FreeSimulation:
     """Per record, where its parts were joined, and the states in which these begin; empty where records are whole."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        return replace(self, records=records)
+        return replace(self, records=records, pieces=())
 
     def with_floor(self, rms: FloatArray) -> Self:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)

@@ -85,7 +85,7 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
     while that gains and more than noise is left. fits: of laws that do nearly the same, the best first; where that
     leaves noise alone, those that leave much more are given up. Without such forces they are complete."""
     measure, tuning = context.measure, context.tuning
-    if not fits or not has_motion_forces(fits[0].hypothesis):
+    if not any(has_motion_forces(law.hypothesis) for law in fits):
         return fits
     if _left(context, fits[0]) <= NO_SECOND_START and any(_left(context, law) > REACHES_NOISE for law in fits):
         near = [law for law in fits if _left(context, law) <= REACHES_NOISE]
@@ -95,13 +95,13 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
             known = sensitivity(measure, tuning, fits[0].deviations, fits[0].hypothesis, context.map_)
 
             def continue_fit(law: Fitted, known: Sensitivity = known) -> Fitted:
-                return fit(measure, tuning, law, known, WHOLE_ROUNDS, context.map_)
+                further = partial(fit, measure, tuning, law, known, WHOLE_ROUNDS, context.map_)
+                return context.guard.part(law.hypothesis.claims[-1].effect.name, FITTING, further, law)
 
-            further: list[Fitted] = list(context.guard.over(context.map_, FITTING)(continue_fit, fits))  # type: ignore[arg-type]
+            before, fits = fits[0].cost, list(context.map_(continue_fit, fits))  # type: ignore[arg-type]
         except OutOfTimeError:
             break  # fits that are not polished are results all the same
-        gained, fits = bool(further) and further[0].cost < fits[0].cost * (1 - POLISHED), further
-        if not gained or _left(context, fits[0]) <= NO_SECOND_START:
+        if fits[0].cost > before * (1 - POLISHED) or _left(context, fits[0]) <= NO_SECOND_START:
             break
     return fits
 

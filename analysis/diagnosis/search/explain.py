@@ -123,8 +123,7 @@ def explain(
     these."""
     before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
-    retuned = refine(context, before)
-    base = context.candidate(retuned)
+    base = context.candidate(refine(context, before))
     confirmed = context.with_test_score(base)
     surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     rounds = _known_rounds(context, base, begun)
@@ -141,11 +140,13 @@ def explain(
         try:
             tried = find_next_effect(within_time, catalogue, base.fitted, step)
             named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
-            both = _look_ahead(within_time, catalogue, base, named, step) if len(rounds) + 1 < most else ()
+            rounds.append(named)
+            free = named[:1] == tried[:1] and len(rounds) < most
+            both = _look_ahead(within_time, catalogue, base, named, step) if free else ()
         except OutOfTimeError:
             ended_early = True
             break
-        rounds += both or (named,)
+        rounds[-1:] = both or (named,)
         if not both and (not named or not is_worthwhile(base, named[0]) or named[0] is not tried[0]):
             barred = tried[0].newest if named and is_worthwhile(base, named[0]) else ""
             break
@@ -172,7 +173,8 @@ def _look_ahead(
             break
         tried = find_next_effect(context, catalogue, first.fitted, step)
         gained = base.score.mean_log_error - tried[0].score.mean_log_error if tried else 0.0
-        if gained > 2 * ADDED_SHARE * excess(base) and tried[0].newest not in context.barred:
+        enough = gained > 2 * ADDED_SHARE * excess(base) and is_worthwhile(first, tried[0])
+        if enough and not any(candidate.newest in context.barred for candidate in tried):
             return (first, *(other for other in named if other is not first)), tried
     return ()
 

@@ -118,8 +118,8 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
     where the first record, of which evidence is taken, has nothing to fit. held: fitted on the whole.
 
     A force with a memory (dry friction, play) may remember what was cut out for longer than the linear model rings:
-    each piece begins in the state that the whole simulation has there, and the run-in is doubled until the shortened
-    recordings show the errors of the whole.
+    each piece begins with the positions and velocities that the whole simulation has there (what forces remember goes
+    on from the piece before), and the run-in is doubled until the shortened recordings show the errors of the whole.
     """
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
@@ -127,7 +127,7 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
     placed = held.hypothesis.placed_effects()
     if any(each.effect.of_time for each in (*measure.known, *placed)):
         return None
-    remembers = any(isinstance(each.effect.acts, (AxisForce, JointForce)) for each in placed)
+    remembers = any(isinstance(each.effect.acts, (AxisForce, JointForce)) for each in (*measure.known, *placed))
     before_s, behind_s = _run_in_s(measure, context.tuning.model)
     periods, kept = [_last_periods(record) for record in measure.records], -1
     while (short := _shorten(context, measure, periods, (before_s, behind_s))) is not None:

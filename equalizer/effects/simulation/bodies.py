@@ -101,7 +101,7 @@ def simulate_bodies(
         for first, end in _blocks(size[0], stepping.block, restarts):
             if restarts is not None and first in restarts.at:
                 state = restarts.states[np.searchsorted(restarts.at, first)]
-                stepping.begin(extend_state(bodies.structure, state))
+                stepping.begin(extend_state(bodies.structure, state, bodies.ports[:, bodies.axes :]))
             rows_of_block = spare[: (end - first) * rows]
             np.matmul(drive[first * rows : end * rows], stepping.into, out=rows_of_block[:, :inner])
             stepping.run(rows_of_block, first)
@@ -151,13 +151,15 @@ def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[i
             yield first, min(first + longest, stop)
 
 
-def extend_state(structure: MechanicalModel, state: FloatArray) -> FloatArray:
+def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArray) -> FloatArray:
     """State (2n,) of a structure to which effects have added bodies, its last coordinates: those take their static
-    equilibrium. state: without them."""
+    equilibrium, and where no spring holds them, the place at which their joint is at rest. state: without them. joints:
+    (n, j), directions of the joints."""
     known, n = len(state) // 2, structure.coordinates
     if n == known:
         return state
-    held, tied = structure.stiffness[known:, known:], structure.stiffness[known:, :known]
+    rows = np.vstack([structure.stiffness[known:], joints.T])
+    held, tied = rows[:, known:], rows[:, :known]
     follows = -np.linalg.lstsq(held, tied, rcond=None)[0]
     positions, velocities = state[:known], state[known:]
     return np.concatenate([positions, follows @ positions, velocities, follows @ velocities])
