@@ -16,8 +16,8 @@ from equalizer.effects.simulation.simulator import (
     Measurement,
     SimulationResult,
     simulate_mechanism,
-    simulate_pieces,
     simulate_response,
+    simulate_windows,
     states_before,
 )
 from equalizer.effects.starts.evidence import Evidence
@@ -87,7 +87,7 @@ class FreeSimulation:
         every = [_coarsen(placed, self.coarser) for placed in under_conditions((*self.known, *effects), signals)]
         if joined is not None:
             sampled = signals.sample_rate_hz, signals.hold
-            return simulate_pieces(model, record.command, sampled, every, measurement, joined)
+            return simulate_windows(model, record.command, sampled, every, measurement, joined)
         return simulate(model, record.command, signals.sample_rate_hz, every, signals.hold, measurement)
 
     def evidence(

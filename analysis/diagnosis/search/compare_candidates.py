@@ -38,7 +38,7 @@ from analysis.diagnosis.settings import (
 )
 
 SECOND_ROUNDS, WHOLE_ROUNDS = 4, 2
-MOST_POLISHED, POLISHED = 2, 0.05
+MOST_POLISHED, POLISHED = 3, 0.002
 """Times at most that fits are polished, and share of the cost that must be gained to go on; each takes a simulation for
 every number of the model. By hand."""
 MOST_REFRESHED, CONVERGED, CONVERGED_FAR, STALE = 4, 0.0005, 0.01, 0.5
@@ -82,8 +82,9 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
 
 def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
     """The fits continued with the sensitivity of all numbers under the forces of the first, which they share, and again
-    while that gains and more than noise is left. fits: of laws that do nearly the same, the best first; where that
-    leaves noise alone, those that leave much more are given up. Without such forces they are complete."""
+    while that gains, at noise too: a fit that leaves hardly more may still be two standard deviations off. fits: of
+    laws that do nearly the same, the best first; where that leaves noise alone, those that leave much more are given
+    up. Without such forces they are complete."""
     measure, tuning = context.measure, context.tuning
     if not any(has_motion_forces(law.hypothesis) for law in fits):
         return fits
@@ -101,7 +102,7 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
             before, fits = fits[0].cost, list(context.map_(continue_fit, fits))  # type: ignore[arg-type]
         except OutOfTimeError:
             break  # fits that are not polished are results all the same
-        if fits[0].cost > before * (1 - POLISHED) or _left(context, fits[0]) <= NO_SECOND_START:
+        if fits[0].cost > before * (1 - POLISHED):
             break
     return fits
 
@@ -146,12 +147,12 @@ def refine_with_sensitivity(
 ) -> tuple[Fitted, Sensitivity]:
     """The refined fit and its sensitivity. Where a drive repeats, it is first fitted to one period of each segment,
     whose sensitivity then stands for all periods; where it does not, under forces that depend on the motion, with
-    longer steps. known: the sensitivity of a law that moves the device nearly
-    alike."""
+    longer steps. known: the sensitivity of a law that moves the device nearly alike."""
     short_form = short_recordings_of(context, fitted)
-    near_context = replace(context, measure=coarsen(context.measure)) if short_form is None else short_form.context
-    if short_form is None and not has_motion_forces(fitted.hypothesis):
+    coarse = coarsen(context.measure)
+    if short_form is None and (coarse is context.measure or not has_motion_forces(fitted.hypothesis)):
         return _refine_from_both_starts(context, fitted, known)
+    near_context = replace(context, measure=coarse) if short_form is None else short_form.context
     near, known = _refine_from_both_starts(
         near_context, evaluate_fit(near_context.measure, context.tuning, fitted.deviations, fitted.hypothesis), known
     )

@@ -267,19 +267,21 @@ def fits_on_short_recordings(
     fits: list[Fitted] = list(each(whole, found))  # type: ignore[arg-type]
     if timed:
         coarse = replace(context, measure=coarsen(context.measure))
-        from_ = evaluate_fit(coarse.measure, context.tuning, base.deviations, base.hypothesis)
-        screened = screen(coarse.measure, context.tuning, from_, of_all, timed, guard.over(context.map_, SCREENING))
-        promising = _keep_promising((begun, found), from_, screened)
-        fits += each(whole, first_fits(coarse, from_, of_all, promising))  # type: ignore[arg-type]
+        begun_whole = evaluate_fit(coarse.measure, context.tuning, base.deviations, base.hypothesis)
+        screened = screen(
+            coarse.measure, context.tuning, begun_whole, of_all, timed, guard.over(context.map_, SCREENING)
+        )
+        promising = _keep_promising((begun, found), begun_whole, screened)
+        fits += each(whole, first_fits(coarse, begun_whole, of_all, promising))  # type: ignore[arg-type]
     # A law that the short recordings leave open may run away on the whole.
     return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda law: law.cost)
 
 
 def _keep_promising(
-    others: tuple[Fitted, Sequence[Fitted]], from_: Fitted, screened: Sequence[ScreenedHypothesis]
+    others: tuple[Fitted, Sequence[Fitted]], begun_whole: Fitted, screened: Sequence[ScreenedHypothesis]
 ) -> list[ScreenedHypothesis]:
-    """The hypotheses that promise a share of the cost of `from_` which is not far below the best share of others; a
-    share, because others are judged on other samples and in other steps. others: their base, and fits."""
+    """The hypotheses that promise a share of the cost of `begun_whole` not far below the best share of others; a share,
+    because others are judged on other samples and in other steps. others: their base, and fits."""
     base, fits = others
     best = max((1 - law.cost / base.cost for law in fits), default=0.0)
-    return [law for law in screened if 1 - law.cost / from_.cost >= max(WORTH_FITTING * best, 0.0)]
+    return [law for law in screened if 1 - law.cost / begun_whole.cost >= max(WORTH_FITTING * best, 0.0)]

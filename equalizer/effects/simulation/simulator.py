@@ -97,20 +97,6 @@ def simulate_windows(
     )
 
 
-def simulate_pieces(
-    model: MechanicalModel,
-    commands: FloatArray,
-    sampled: tuple[float, Hold],
-    effects: Sequence[PlacedEffect],
-    measurement: Measurement | None,
-    restarts: Restarts,
-) -> SimulationResult:
-    """Simulate pieces of a recording that are joined end to end: with `simulate_response`, restarted from given
-    states."""
-    played = _simulate_motion(model, commands, sampled, effects, axes=False, restarts=restarts)
-    return _apply_sensor(model, played, sampled[0], effects, measurement)
-
-
 def states_before(
     model: MechanicalModel,
     commands: FloatArray,

@@ -38,7 +38,7 @@ def test_a_rival_started_from_shared_sensitivities_converges_to_its_own_fit(rubb
     assert shared.cost == pytest.approx(alone.cost, rel=1e-3)
     assert shared.cost < 1.001 * plain.cost
     assert shared.hypothesis.point == pytest.approx(alone.hypothesis.point, abs=0.01)
-    assert shared.deviations == pytest.approx(alone.deviations, abs=0.2)
+    assert shared.deviations == pytest.approx(alone.deviations, abs=0.1)
 
 
 def test_sensitivities_that_say_nothing_do_not_leave_the_model_as_it_was_given(rubbing):

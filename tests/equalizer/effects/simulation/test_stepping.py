@@ -27,8 +27,8 @@ from equalizer.effects.simulation.mechanism_kernel import SETTLED, compile_law
 from equalizer.effects.simulation.modal_form import step_form
 from equalizer.effects.simulation.simulator import (
     simulate_mechanism,
-    simulate_pieces,
     simulate_response,
+    simulate_windows,
     states_before,
 )
 from equalizer.effects.simulation.stepping import BLOCK
@@ -231,7 +231,7 @@ def test_pieces_begun_in_the_states_of_the_whole_go_on_as_the_whole_does(bench, 
     states = states_before(model, commands, sampled, effects, starts)
     kept = np.r_[90:150, 250:400]
     joined = Restarts(np.array([0, 60]), states)
-    pieces = simulate_pieces(model, commands[kept], sampled, effects, None, joined)
+    pieces = simulate_windows(model, commands[kept], sampled, effects, None, joined)
     # The sensor's low-pass forgets within some samples what it saw before a piece.
     inside = np.r_[40:60, 100:210]
     np.testing.assert_allclose(pieces.response[inside], whole.response[kept][inside], rtol=0, atol=1e-8)
