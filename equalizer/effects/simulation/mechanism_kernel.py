@@ -47,12 +47,12 @@ warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
 LAWS = 6
 """How many different laws can act at once."""
-SWEEPS = 3
+SWEEPS = 12
 """Most Gauss-Seidel sweeps over all forces per step, where there are several: each is solved again with the others'
 newest values."""
-SETTLED = 1e-4
-"""Relative change of a force below which the others are not solved again. Of the motion 1.2e-4 at most then differs
-from the converged one (a joint with friction beside an axis with friction; 7e-9 with friction on a spring)."""
+SETTLED = 1e-6
+"""Relative change of a force below which the others are not solved again. Of the motion 1e-6 at most then differs from
+the converged one (a joint with friction beside an axis with friction)."""
 OWN_ROWS = 4
 """Rows of the table of forces: mean over the step, mean over the step before, force at the end, whether another has
 changed since it was solved."""

@@ -23,7 +23,7 @@ from equalizer.effects.simulation.instant import (
     V,
     X,
 )
-from equalizer.effects.simulation.mechanism_kernel import SETTLED, compile_law
+from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.simulation.modal_form import step_form
 from equalizer.effects.simulation.simulator import (
     simulate_mechanism,
@@ -37,9 +37,9 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 
 RATE_HZ, SAMPLES = 1000.0, 400
-WITHIN, RUBBING, TOGETHER = 1e-9, 1e-6, 2 * SETTLED
+WITHIN, RUBBING = 1e-9, 1e-6
 """Relative. Dry friction is iterated to a millionth of its longest bend, where rounding may ask for one turn more;
-several forces until they change by SETTLED, here until they stand still."""
+several forces until they stand still."""
 CONVERGED = 60
 """Sweeps over several forces."""
 
@@ -107,7 +107,6 @@ def assert_same(model, effects, commands, steps, fine=1):
     found, pushed = simulate_bodies(bodies, driven, size, step_s)
     wanted, forced = plainly(bodies, driven, size, step_s)
     within = RUBBING if any(act.memory for act in bodies.acts) else WITHIN
-    within = TOGETHER if len(bodies.acts) > 1 else within
     scale = np.abs(wanted).max(axis=0) + 1e-12
     np.testing.assert_array_less(np.abs(found - wanted).max(axis=0) / scale, within)
     np.testing.assert_allclose(pushed, forced, atol=within * (np.abs(forced).max() + 1e-12), rtol=0)
