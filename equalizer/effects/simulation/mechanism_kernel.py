@@ -50,7 +50,7 @@ LAWS = 6
 SWEEPS = 12
 """Most Gauss-Seidel sweeps over all forces per step, where there are several: each is solved again with the others'
 newest values."""
-SETTLED = 1e-6
+SETTLED = 1e-7
 """Relative change of a force below which the others are not solved again. Of the motion 1e-6 at most then differs from
 the converged one (a joint with friction beside an axis with friction)."""
 OWN_ROWS = 4
