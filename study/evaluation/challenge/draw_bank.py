@@ -32,8 +32,9 @@ SIZES = (0.72, 0.14)
 """Fractions of the bank with one and with two driven axes."""
 STEPS = 80
 """Integration steps per sample: enough that the integration error is not what a diagnosis finds."""
-ALL_AXES = ("sensor_misalignment", "cross_axis_sensitivity", "crossed_axes")
-"""Effects that need three axes to be identifiable."""
+ALL_AXES = ("sensor_misalignment", "cross_axis_sensitivity", "crossed_axes", "extra_mode")
+"""Effects that need three axes to be identifiable: the others' readings, or the direction of a mode, whose pull on one
+axis is that of less mass."""
 ONE_ROW = (
     frozenset(name for name in EFFECTS if "friction" in name or name == "presliding_hysteresis"),
     frozenset(("sensor_misalignment", "cross_axis_sensitivity")),

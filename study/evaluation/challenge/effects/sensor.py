@@ -141,9 +141,10 @@ def _draw_crossed(at: EffectContext) -> dict[str, float]:
 
 
 def _build_crossed(device: Device, axis: int, values: Values) -> Device:
+    # In place of an unlabelled extra's mixing, so that the label is what the device has.
     mixing = device.sensor.orientation.copy()
-    mixing[axis, (axis + 1) % 3] += values["from_next"]
-    mixing[axis, (axis + 2) % 3] += values["from_after_next"]
+    mixing[axis, (axis + 1) % 3] = values["from_next"]
+    mixing[axis, (axis + 2) % 3] = values["from_after_next"]
     return _with_sensor(device, replace(device.sensor, orientation=mixing))
 
 
