@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine, hypothesis_of_claim
-from analysis.diagnosis.errors.intervals import standard_errors
+from analysis.diagnosis.errors.intervals import sensitivity_to_all, standard_errors
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, SearchContext, sensitivity_at
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
@@ -26,7 +26,8 @@ def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
     """The fit repeated with exponents held at whole or half numbers; unchanged where none is near one, or where that
     costs too much."""
     known = sensitivity_at(context, fitted.deviations, fitted.hypothesis)
-    errors = standard_errors(context.measure, context.tuning, fitted, known)[len(context.tuning.names) :]
+    of_all = sensitivity_to_all(context.measure, context.tuning, fitted.deviations, fitted.hypothesis, context.map_)
+    errors = standard_errors(context.measure, fitted, of_all)[len(context.tuning.names) :]
     plain = _with_simple_exponents(context, fitted.hypothesis, errors)
     if plain is None:
         return fitted

@@ -120,6 +120,18 @@ def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
     )
 
 
+def move_point(hypothesis: Hypothesis, step: FloatArray, straight: bool) -> Hypothesis:
+    """The hypothesis with its coordinates moved. straight: values change in proportion to the step also where
+    coordinates are logarithms, and a tenth of them is left at least. Along a valley in which a number of the model
+    makes up for one of the effect (two masses), steps of logarithms leave the valley's floor."""
+    if not straight:
+        return replace(hypothesis, point=hypothesis.point + step)
+    logarithmic = np.array([number.parameter.scale == "log" for number in hypothesis.numbers], dtype=np.bool_)
+    by = np.where(logarithmic, np.log1p(np.maximum(step, -0.9)), step)
+    low, high = np.array([number.bounds for number in hypothesis.numbers]).reshape(-1, 2).T
+    return replace(hypothesis, point=np.clip(hypothesis.point + by, low, high))
+
+
 def hypothesis_of_claim(claim: Claim, values: Sequence[Values]) -> Hypothesis:
     """A hypothesis of one claim. values: one set per group."""
     free = [(p, of_group) for of_group in values for p in claim.effect.parameters if not p.fixed]

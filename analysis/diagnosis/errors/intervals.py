@@ -1,59 +1,156 @@
-"""Standard errors of a fit that hold where residuals are neither white nor of the assumed variance.
+"""The end of a fit, and standard errors that hold where residuals are neither white nor of the assumed variance.
+
+End: a search compares fits at shares of their cost, which with 10^5 samples may leave a number several standard errors
+from the minimum. The final fit goes on until the sum of squares falls by less than `FINISHED`. Its sensitivities are
+central differences: numbers that change the prediction alike (a mass that was added, and the model's own) must have
+proportional columns, and the curvature in one-sided differences would count as information that separates them.
 
 Noise: sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches longer than the residuals'
-correlation time. Systematic errors: no law is exact, so that another level or axis would give other numbers; delete-one
-jackknife over segments (Efron and Stein, Ann. Stat. 9:586, 1981), each estimate by one Gauss-Newton step,
+correlation time. Where a drive repeats, so does what a model cannot reproduce: the same stretch of all periods of a
+segment is one cluster (Liang and Zeger, Biometrika 73:13, 1986). Systematic errors: no law is exact, so that another
+level or axis would give other numbers; delete-one jackknife over segments (Efron and Stein, Ann. Stat. 9:586, 1981),
+each estimate by one Gauss-Newton step,
 
     theta_g - theta = -(A - A_g)^-1 b_g,   A = sum of A_g + prior,   A_g = X_g X_g',   b_g = X_g r_g.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
+from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, hypothesis_sensitivity, residuals_to_fit
+from analysis.diagnosis.errors.output_error import MOVED, Fitted, Sensitivity, residuals_to_fit, take_step
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.types import Mask
+from analysis.diagnosis.noise.periods import settled_periods
+from analysis.diagnosis.types import Mapper, Mask, TimeBudget
+from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
+
+Places = npt.NDArray[np.int64]
 
 STRETCH_S = 0.5
 """Length of the stretches over which residuals are summed: longer than their correlation time."""
 AT_AN_END = 1e-6
 """Distance of a coordinate from its bound up to which it counts as at the bound."""
+FINISHED = 0.01
+"""Fall of the sum of squares, in noise variances, that ends a fit: the minimum is then within a tenth of a standard
+error."""
+FINISHING = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
+"""As `DAMPINGS`; less, so that the calibration decides along a valley that the data leave flat."""
+MOST_ROUNDS, STEPS = 4, 3
+"""Times that the sensitivity is computed at most, and steps with each."""
 
 
-def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known: Sensitivity) -> FloatArray:
-    """(t + numbers,): standard errors of the deviations and of the hypothesis's point; 0 for numbers at a bound."""
-    errors = residuals_to_fit(measure, fitted.residuals)
-    own = hypothesis_sensitivity(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
-    pulls = _stretches(measure, known, own, errors)
-    middle = pulls @ pulls.T
-    t, across = len(fitted.deviations), known.on(own)
-    information = np.block([[known.squares, across], [across.T, own @ own.T]])
-    # The calibration is one more observation per parameter, with a standard deviation of one.
-    information[:t, :t] += np.eye(t)
-    middle[:t, :t] += np.eye(t)
+def sensitivity_to_all(
+    measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis, map_: Mapper = map
+) -> Sensitivity:
+    """Sensitivity (t + numbers, samples) to the model's parameters, then to the hypothesis's numbers, by central
+    differences; one-sided where the other side gives no valid model, and 0 for numbers at a bound."""
+    t, numbers = len(deviations), hypothesis.numbers
+    held = _at_an_end(hypothesis)
+
+    def moved(number: int, by: float) -> FloatArray | None:
+        at, point = deviations.copy(), hypothesis.point.copy()
+        (at if number < t else point)[number if number < t else number - t] += by
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                left = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.placed_effects(point)))
+        except (MechanicalModelError, np.linalg.LinAlgError):
+            return None
+        return left if np.isfinite(left).all() else None
+
+    def column(number: int) -> FloatArray:
+        if number >= t and held[number - t]:
+            return np.zeros(samples)
+        sides = [(by, left) for by in _both_ways(hypothesis, number - t) if (left := moved(number, by)) is not None]
+        if len(sides) == 1:
+            sides.append((0.0, residuals_to_fit(measure, measure.residuals(tuning.tune(deviations), placed))))
+        if not sides:
+            return np.zeros(samples)
+        (low, before), (high, after) = sides
+        return np.asarray((before - after) / (high - low))
+
+    placed = hypothesis.placed_effects()
+    samples = sum(int(record.fit.sum()) * record.measured.shape[1] for record in measure.records)
+    columns = np.array(list(map_(column, range(t + len(numbers))))).reshape(t + len(numbers), samples)
+    return Sensitivity(deviations, columns, columns @ columns.T)
+
+
+def _both_ways(hypothesis: Hypothesis, number: int) -> tuple[float, float]:
+    """Steps down and up within the bounds. number: of the hypothesis; below 0: of the model."""
+    if number < 0:
+        return -MOVED, MOVED
+    (low, high), at = hypothesis.numbers[number].bounds, hypothesis.point[number]
+    step = hypothesis.numbers[number].move
+    return max(-step, low - at), min(step, high - at)
+
+
+def finish_fit(
+    measure: ErrorMeasure,
+    tuning: Tuning,
+    fitted: Fitted,
+    sensitivity_of: Callable[[Fitted], Sensitivity],
+    time_left: TimeBudget,
+) -> tuple[Fitted, Sensitivity]:
+    """The fit at its minimum, and the sensitivity to all its numbers there. sensitivity_of: as `sensitivity_to_all`;
+    computed once, and again after steps that lowered the sum of squares by more than `FINISHED`."""
+    known, samples = sensitivity_of(fitted), len(residuals_to_fit(measure, fitted.residuals))
+    for _ in range(MOST_ROUNDS):
+        begun = fitted.cost
+        for _ in range(STEPS):
+            better = take_step(measure, tuning, fitted, _normal_equations(measure, fitted, known), FINISHING)
+            if better is None:
+                break
+            gained, fitted = samples * (fitted.cost - better.cost), better
+            if gained < FINISHED:
+                break
+        if samples * (begun - fitted.cost) < FINISHED or not time_left():
+            break
+        known = sensitivity_of(fitted)
+    return fitted, known
+
+
+def _normal_equations(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> tuple[FloatArray, FloatArray]:
+    """Normal matrix and right side of a Gauss-Newton step in all numbers, with the calibration as observations."""
+    pull, t = known.on(residuals_to_fit(measure, fitted.residuals)), len(fitted.deviations)
+    pull[:t] -= fitted.deviations
+    return _with_calibration(known.squares, t), pull
+
+
+def _with_calibration(squares: FloatArray, t: int) -> FloatArray:
+    """The calibration is one more observation per parameter of the model, with a standard deviation of one."""
+    whole = squares.copy()
+    whole[:t, :t] += np.eye(t)
+    return whole
+
+
+def standard_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray:
+    """(t + numbers,): standard errors of the deviations and of the hypothesis's point; 0 for numbers at a bound. known:
+    sensitivity to all numbers (`sensitivity_to_all`)."""
+    t = len(fitted.deviations)
+    scores = _scores(measure, known, residuals_to_fit(measure, fitted.residuals))
+    middle = _with_calibration(scores @ scores.T, t)
+    information = _with_calibration(known.squares, t)
     scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
     return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ middle @ inverse), 0.0)))
 
 
-def segment_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known: Sensitivity) -> FloatArray | None:
-    """(t + numbers,): jackknife standard errors over segments; None where there is one segment."""
+def segment_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray | None:
+    """(t + numbers,): jackknife standard errors over segments; None where there is one segment. known: as above."""
     errors = residuals_to_fit(measure, fitted.residuals)
-    own = hypothesis_sensitivity(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
     products, pulls = [], []
     for begin, end in _segments(measure):
-        moves = np.vstack([known.over(begin, end), own[:, begin:end]])
+        moves = known.over(begin, end)
         products.append(moves @ moves.T)
         pulls.append(moves @ errors[begin:end])
     if len(products) < 2:
         return None
-    whole, t = np.sum(products, axis=0), len(fitted.deviations)
-    whole[:t, :t] += np.eye(t)
+    whole = _with_calibration(np.sum(products, axis=0), len(fitted.deviations))
     scale = np.sqrt(np.maximum(np.diagonal(whole), np.finfo(float).tiny))
     left_out = []
     for part, pull in zip(products, pulls, strict=True):
@@ -80,15 +177,28 @@ def _at_an_end(hypothesis: Hypothesis) -> Mask:
     return np.array(held, dtype=np.bool_)
 
 
-def _stretches(measure: ErrorMeasure, known: Sensitivity, own: FloatArray, errors: FloatArray) -> FloatArray:
-    """(t + numbers, stretches): score of each number (column times residual), summed per stretch."""
-    pulls, first = [], 0
+def _scores(measure: ErrorMeasure, known: Sensitivity, errors: FloatArray) -> FloatArray:
+    """(t + numbers, clusters): score of each number (column times residual), summed per cluster."""
+    sums: list[FloatArray] = []
+    first = 0
     for record in measure.records:
-        width = record.measured.shape[1] * max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
-        last = first + int(record.fit.sum()) * record.measured.shape[1]
-        for begin in range(first, last, width):
-            end = min(begin + width, last)
-            part = slice(begin, end)
-            pulls.append(np.concatenate([known.over(begin, end) @ errors[part], own[:, part] @ errors[part]]))
-        first = last
-    return np.array(pulls).T.reshape(len(known.columns) + len(own), -1)
+        width, clusters = record.measured.shape[1], _clusters(record)[record.fit]
+        by_cluster = np.zeros((int(clusters.max(initial=-1)) + 1, len(known.columns)))
+        edges = [0, *(np.flatnonzero(np.diff(clusters)) + 1).tolist(), len(clusters)]
+        for begin, end in pairwise(edges):
+            if end > begin:
+                part = slice(first + width * begin, first + width * end)
+                by_cluster[clusters[begin]] += known.over(part.start, part.stop) @ errors[part]
+        first += width * len(clusters)
+        sums.append(by_cluster)
+    return np.concatenate(sums).T
+
+
+def _clusters(record: Observed) -> Places:
+    """(n,): number of the cluster of each sample: stretches of `STRETCH_S`, the same of all periods of a segment."""
+    width = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
+    place = np.arange(len(record.fit))
+    for periods in settled_periods(record.recording):
+        inside = slice(periods.segment.start, min(periods.segment.stop, len(place)))
+        place[inside] = periods.segment.start + (place[inside] - periods.segment.start) % periods.length
+    return np.asarray(np.unique(place // width, return_inverse=True)[1])

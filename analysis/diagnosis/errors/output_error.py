@@ -18,14 +18,14 @@ References: Ljung, System Identification (1999), section 10.2; Marquardt, J. SIA
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.data.growth_rate import is_unstable_within
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.errors.hypothesis import Hypothesis, move_point
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.starts.evidence import Evidence
@@ -34,6 +34,9 @@ from equalizer.signals.signal import FloatArray
 
 MOVED = 0.1
 """Step of the finite differences, in standard deviations."""
+Dampings = Sequence[tuple[float, bool]]
+"""Shares of the normal matrix's diagonal that are added, and whether the step is one of values (`move_point`)."""
+DAMPINGS: Dampings = ((1e-9, False), (1e-3, False), (0.1, False), (3.0, False))
 LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
 """Largest step of a hypothesis's parameter, by its scale: a factor of e; a multiple of its start; unlimited."""
 
@@ -58,11 +61,6 @@ class Sensitivity:
             rows = np.array([self._sum_periods(row) for row in rows]).reshape(len(rows), self.columns.shape[1])
         products = self.columns @ rows.T
         return products if errors.ndim > 1 else products[:, 0]
-
-    @property
-    def whole(self) -> FloatArray:
-        """(t, samples): columns on all samples to fit, with periods repeated."""
-        return self.over(0, self.columns.shape[1] if self.repeated is None else len(self.repeated) * self._channels)
 
     def over(self, first: int, last: int) -> FloatArray:
         """(t, last - first): columns on a run of the samples to fit, channel after channel at each instant; whole
@@ -174,7 +172,7 @@ def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, 
 
 
 def _cost(errors: FloatArray, deviations: FloatArray) -> float:
-    with np.errstate(over="ignore", invalid="ignore"):  # cost of a simulation that diverged: no fit is worse
+    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
         cost = float(errors @ errors + deviations @ deviations) / max(len(errors), 1)
     return cost if np.isfinite(cost) else np.inf
 
@@ -192,16 +190,29 @@ def _gauss_newton_step(
     if not (np.isfinite(products).all() and np.isfinite(pull).all()):
         # A parameter made the simulation diverge.
         return None
+    return take_step(measure, tuning, from_, (products, pull))
+
+
+def take_step(
+    measure: ErrorMeasure,
+    tuning: Tuning,
+    from_: Fitted,
+    system: tuple[FloatArray, FloatArray],
+    dampings: Dampings = DAMPINGS,
+) -> Fitted | None:
+    """The fit after a damped Gauss-Newton step within the bounds; None where no damping lowers the cost. system: normal
+    matrix and right side, of the model's parameters, then the hypothesis's."""
+    t = len(from_.deviations)
     now = np.concatenate([from_.deviations, from_.hypothesis.point])
     low, high = (bound - now for bound in _bounds(from_.hypothesis, t))
     longest = _longest(from_.hypothesis)
     low[t:], high[t:] = np.maximum(low[t:], -longest), np.minimum(high[t:], longest)
-    found, impossible = _first_better(measure, tuning, from_, (products, pull), (low, high))
+    found, impossible = _first_better(measure, tuning, from_, system, (low, high), dampings)
     if found is None and impossible:
         # A mass whose best value is negative must not stop the other parameters: it stays fixed.
         masses = [place for place, name in enumerate(tuning.names) if name.startswith("mass")]
         low[masses] = high[masses] = 0.0
-        found, _ = _first_better(measure, tuning, from_, (products, pull), (low, high))
+        found, _ = _first_better(measure, tuning, from_, system, (low, high), dampings)
     return found
 
 
@@ -211,15 +222,16 @@ def _first_better(
     from_: Fitted,
     system: tuple[FloatArray, FloatArray],
     bounds: tuple[FloatArray, FloatArray],
+    dampings: Dampings,
 ) -> tuple[Fitted | None, bool]:
     """The fit after the first of ever shorter steps that lowers the cost, None where none does; and whether any step
     led to an invalid mechanical model. system: normal matrix and right side."""
     (products, pull), t, impossible = system, len(from_.deviations), False
     # Steps that make the model less stable are refused, unless it is unstable already.
     grows = is_unstable_within(tuning.tune(from_.deviations), _longest_s(measure))
-    for damping in (1e-9, 1e-3, 0.1, 3.0):
+    for damping, straight in dampings:
         step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, *bounds)
-        there = replace(from_.hypothesis, point=from_.hypothesis.point + step[t:])
+        there = move_point(from_.hypothesis, step[t:], straight)
         try:
             model = tuning.tune(from_.deviations + step[:t])
             if not grows and is_unstable_within(model, _longest_s(measure)):

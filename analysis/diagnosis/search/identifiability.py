@@ -14,13 +14,20 @@ import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Number
-from analysis.diagnosis.errors.intervals import STRETCH_S, segment_errors, standard_errors
+from analysis.diagnosis.errors.intervals import (
+    STRETCH_S,
+    finish_fit,
+    segment_errors,
+    sensitivity_to_all,
+    standard_errors,
+)
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
 from analysis.diagnosis.search.revise_selection import without_effect
-from analysis.diagnosis.search.search_context import SearchContext, sensitivity_at
+from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.short_recordings import short_recordings_of
+from analysis.diagnosis.search.time_budget import always
 from analysis.diagnosis.settings import (
     INTERVAL_FACTOR,
     MOST_BETWEEN_SEGMENTS,
@@ -41,34 +48,64 @@ def number_errors(context: SearchContext, found: Explanation) -> FloatArray:
 
 
 def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
-    """(t + numbers,): standard errors of the final fit, of the model's own deviations first. Beside a single body, what
-    a force along the motion changes in the sensitivity to its numbers is not left out: that costs three runs."""
+    """(t + numbers,): standard errors of the final fit, of the model's own deviations first."""
     last = found.steps[-1] if found.steps else found.retuned
     if found.errors is not None and found.errors[0] is last.fitted:
         return found.errors[1]
-    fitted, known = _with_sensitivity(context, last.fitted)
-    return standard_errors(context.measure, context.tuning, fitted, known)
+    return standard_errors(context.measure, *_with_sensitivity(context, found))
 
 
 def interval_errors(context: SearchContext, found: Explanation, noise: FloatArray) -> FloatArray:
     """(t + numbers,): standard errors for the intervals that are stated. noise: `final_errors`, or their profiles. To
     these comes what varies between segments, up to a few times the noise's: with few segments a jackknife has heavy
     tails. A single segment tells nothing of that, and a factor stands for it."""
-    last = found.steps[-1] if found.steps else found.retuned
-    between = segment_errors(context.measure, context.tuning, *_with_sensitivity(context, last.fitted))
+    between = segment_errors(context.measure, *_with_sensitivity(context, found))
     if between is None:
         return INTERVAL_FACTOR * noise
     return np.asarray(np.hypot(noise, np.minimum(between, MOST_BETWEEN_SEGMENTS * noise)))
 
 
-def _with_sensitivity(context: SearchContext, last: Fitted) -> tuple[Fitted, Sensitivity]:
-    """The fit on the samples to fit and to choose by, with the sensitivity to the model's own numbers."""
+def finish(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+    """The explanation with its final fit at the minimum, and with the sensitivity there."""
+    if not found.steps or found.statistic is not None:
+        return found
+    last = found.steps[-1]
+    fitted, known = _finish(context, last.fitted, time_left)
+    if fitted is last.fitted:
+        return replace(found, known=(fitted, known))
+    done = context.candidate(fitted)
+    rounds = tuple(tuple(done if each is last else each for each in tried) for tried in found.rounds)
+    return replace(
+        found,
+        after=context.with_test_score(done),
+        rounds=rounds,
+        steps=(*found.steps[:-1], done),
+        known=(fitted, known),
+    )
+
+
+def _finish(context: SearchContext, fitted: Fitted, time_left: TimeBudget) -> tuple[Fitted, Sensitivity]:
+    def of(at: Fitted) -> Sensitivity:
+        return _sensitivity_of(context, at)
+
+    return finish_fit(context.measure, context.tuning, fitted, of, time_left)
+
+
+def _with_sensitivity(context: SearchContext, found: Explanation) -> tuple[Fitted, Sensitivity]:
+    """The final fit on the samples to fit and to choose by, with the sensitivity to all its numbers."""
+    last = (found.steps[-1] if found.steps else found.retuned).fitted
+    if found.known is not None and found.known[0] is last:
+        return found.known
     fitted = evaluate_fit(context.measure, context.tuning, last.deviations, last.hypothesis)
-    single = context.tuning.model.coordinates == 1
+    return fitted, _sensitivity_of(context, fitted)
+
+
+def _sensitivity_of(context: SearchContext, fitted: Fitted) -> Sensitivity:
+    """Sensitivity to all numbers of a fit, on one period of each segment where the drive repeats."""
     short_form = short_recordings_of(context, fitted)
     near = context if short_form is None else short_form.context
-    known = sensitivity_at(near, fitted.deviations, fitted.hypothesis, with_forces=single)
-    return fitted, known if short_form is None else short_form.repeat_sensitivity(known)
+    known = sensitivity_to_all(near.measure, near.tuning, fitted.deviations, fitted.hypothesis, near.map_)
+    return known if short_form is None else short_form.repeat_sensitivity(known)
 
 
 def keep_identifiable(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
@@ -152,10 +189,12 @@ def _numbers_with_none(found: Explanation, errors: FloatArray) -> Iterator[list[
 def _open_effects(context: SearchContext, found: Explanation) -> Iterator[bool]:
     """Whether an effect is open, by effect: the intervals of all its numbers that can mean no effect include it."""
     for own in _numbers_with_none(found, number_errors(context, found)):
-        yield bool(own) and all(_is_open(number, at, error) for number, _, at, error in own)
+        yield bool(own) and all(is_open(number, at, error) for number, _, at, error in own)
 
 
-def _is_open(number: Number, at: float, error: float) -> bool:
+def is_open(number: Number, at: float, error: float) -> bool:
+    """Whether the number's interval contains the value that means no effect. error: standard error of its
+    coordinate `at`."""
     reach, away = _reach(number, at, error)
     value, none = number.value(at), number.parameter.none or 0.0
     return away <= _ABSENT * max(abs(value), abs(none)) or not reach <= away
@@ -172,8 +211,10 @@ def distance_from_none(context: SearchContext, found: Explanation, effect: int) 
     excludes no effect. effect: its place."""
     with_it = found.steps[-1].fitted
     fewer = found.retuned if len(found.steps) == 1 else without_effect(context, found, effect).steps[-1]
-    # The re-tuned model is kept as it is on all samples.
-    without = evaluate_fit(context.measure, context.tuning, fewer.fitted.deviations, fewer.fitted.hypothesis)
+    # The re-tuned model is kept as it is on all samples. Both fits end at their minimum: else the difference is not all
+    # the effect's.
+    start = evaluate_fit(context.measure, context.tuning, fewer.fitted.deviations, fewer.fitted.hypothesis)
+    without = _finish(context, start, always)[0]
     gained = np.concatenate([
         _stretches(context.measure, without) - _stretches(context.measure, with_it),
         # The calibration is an observation of its own.

@@ -9,6 +9,7 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
 from analysis.diagnosis.errors.band_power import BandPower
+from analysis.diagnosis.errors.band_power_fit import BandPowerFit
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import NOTHING
@@ -17,7 +18,7 @@ from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.assemble_findings import impact_remainder
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.impacts import explain_impacts, is_irregular
+from analysis.diagnosis.search.impacts import _is_gap_open, explain_impacts, is_irregular
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
 from equalizer.effects.backlash import EFFECT as PLAY
@@ -25,6 +26,7 @@ from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.coulomb_friction import EFFECT as DRY
 from equalizer.effects.effect import PlacedEffect
 from study.evaluation.challenge.draw_case import draw_case
+from study.evaluation.challenge.rig import Rig
 
 GAP_M, AXIS = 5e-5, 1
 LOOSE = (
@@ -76,6 +78,22 @@ def test_its_numbers_come_with_errors(told):
     errors = told.statistic.errors
     assert errors.shape == told.after.fitted.hypothesis.point.shape
     assert np.all((errors > 0) & (errors < 0.5))
+
+
+def test_a_gap_whose_interval_contains_zero_is_not_named(told):
+    last = told.after.fitted
+    fitted = BandPowerFit(last.hypothesis, last.deviations, np.zeros(1), 0.0, told.statistic.errors)
+    assert not _is_gap_open(fitted)
+    assert _is_gap_open(replace(fitted, errors=np.ones_like(fitted.errors)))
+
+
+@pytest.mark.slow
+def test_commands_that_are_skipped_are_no_play():
+    """Irregular, and as far from the record as chance takes it; but the gap may be zero."""
+    case = draw_case(100021, ("skipped_commands",), "retuned", 0.5945393048969988, rig=Rig((0,), 2000, 3, 1.0, 80))
+    found = diagnose([case.recording], case.model, DiagnosisSettings(discovery=False), map, lambda what, share: None)
+    assert found.diagnosis.verdict == "unexplained"
+    assert found.diagnosis.effects == ()
 
 
 def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sample(loose):

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
-from analysis.diagnosis.errors.intervals import standard_errors
+from analysis.diagnosis.errors.intervals import sensitivity_to_all, standard_errors
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.search_context import sensitivity_at
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -37,8 +36,8 @@ def test_a_wider_band_with_a_jump_is_found_to_be_a_plain_one(context):
 
 def test_a_number_at_the_end_of_its_range_is_held_there_and_leaves_the_others_sure(context):
     fitted = refined_from(context, TRUE_N, 0.0)
-    known = sensitivity_at(context, fitted.deviations, fitted.hypothesis)
-    width, jump = standard_errors(context.measure, context.tuning, fitted, known)[-2:]
+    known = sensitivity_to_all(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
+    width, jump = standard_errors(context.measure, fitted, known)[-2:]
     assert jump == 0.0
     assert 0.0 < width < 0.02  # of the logarithm
 
