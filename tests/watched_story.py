@@ -14,8 +14,8 @@ from study.session.facts.events import (
 )
 from study.session.state.due_trial import Present
 from study.session.state.machine import Finish, Rest, next_action
+from study.session.watching.followed_session import Watched, begin_watching, follow
 from study.session.watching.live import Live
-from study.session.watching.watched import Watched, begin_watching, follow
 from study.session.watching.watching import LiveInfo, watch_view
 from tests.session_facts import opened, presented
 

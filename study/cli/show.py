@@ -77,7 +77,7 @@ def _folder(what: str, data: Path) -> Path:
 
 def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
     from study.tui.drawing.staircase_drawing import LEGEND
-    from study.tui.standing_words import describe
+    from study.tui.session_status import describe
     from study.tui.text_rows import align_rows
 
     yield describe(view.line)

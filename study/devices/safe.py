@@ -15,10 +15,10 @@ from equalizer.signals.signal import Signal
 from study.devices.admission import check_commands, check_hardware, check_settings, check_stimulus
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
-from study.devices.drive.played import record_commands, record_held_stimulus
+from study.devices.drive.last_reading import look_of
 from study.devices.drive.realtime_drive import RealtimeDrive
+from study.devices.drive.recorded_run import record_commands, record_held_stimulus
 from study.devices.drive.runner import CompiledRunner, Runner
-from study.devices.drive.seen import look_of
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import VirtualDrive
 from study.devices.governor.governor import SETTLE_S, Governor

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.actuator import DrivenAxis, find_balance
-from analysis.diagnosis.balance.actuator_twins import doubt_laws_of_actuator
+from analysis.diagnosis.balance.actuator_equivalents import doubt_laws_of_actuator
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motion_band_hz, motions_of

@@ -17,7 +17,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.device import Fault
 from study.devices.drive.compiled_drive import COURSE_SIZE, DECIDING, GONE, OVER, STAMPS, WRITING
 from study.devices.drive.compiled_ticks import CompiledTicks, halves_of
-from study.devices.drive.seen import Seen
+from study.devices.drive.last_reading import LastReading
 from study.devices.governor import cells, govern
 from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE, Rig
@@ -77,7 +77,7 @@ class SteppedRunner:
         self.catches_up = catches_up
         self.failure: BaseException | None = None
         self.force_off = self.disconnected = True
-        self._seen: Seen | None = None
+        self._seen: LastReading | None = None
         self.course: FloatArray = np.zeros(COURSE_SIZE)
         halves = halves_of(rig) if now_s is None or monotonic else None
         self._compiled = CompiledTicks(halves, governor, self.course) if halves is not None else None
@@ -91,11 +91,11 @@ class SteppedRunner:
         return self._governor.moving or bool(self.course[DECIDING])
 
     @property
-    def seen(self) -> Seen | None:
+    def seen(self) -> LastReading | None:
         if self._gone:
             return None
         reading = self._compiled.seen() if self._compiled is not None else None
-        return self._seen if reading is None else Seen(reading, self._rig.buttons())
+        return self._seen if reading is None else LastReading(reading, self._rig.buttons())
 
     @property
     def attends(self) -> bool:
@@ -113,7 +113,7 @@ class SteppedRunner:
         if self._gone:
             return
         try:
-            self._seen = Seen(self._read(), self._rig.buttons())
+            self._seen = LastReading(self._read(), self._rig.buttons())
         except Exception:  # noqa: BLE001 - a look hears that there is no reading; the next tick says why
             self._seen = None
 
@@ -159,7 +159,7 @@ class SteppedRunner:
     def _conclude(self, code: int) -> None:
         assert self._compiled is not None
         if (reading := self._compiled.last_seen()) is not None:
-            self._seen = Seen(reading, self._rig.buttons())
+            self._seen = LastReading(reading, self._rig.buttons())
         if code > 0:
             raise self._compiled.error(code)
 
@@ -205,7 +205,7 @@ class SteppedRunner:
         self.course[DECIDING] = 0.0
         govern.publish(governor.state, governor.settings, governor.ring, reading)
         if not over:
-            self._seen = Seen(reading, self._rig.buttons())
+            self._seen = LastReading(reading, self._rig.buttons())
         return bool(over)
 
     def _read(self) -> FloatArray:

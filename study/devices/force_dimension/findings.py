@@ -12,7 +12,7 @@ from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rigs import info_of
 from study.devices.force_dimension.usb import ADVICE, find_usb_devices
-from study.devices.force_dimension.watchdog_proof import prove_watchdog
+from study.devices.force_dimension.watchdog_check import check_watchdog
 from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
 
@@ -122,7 +122,7 @@ def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[Dev
     if not (status.powered and calibrated):
         return findings
     drops_after_s = make_ready(handle, model, CAP_N, lab.effector_mass_kg)
-    took_s = prove_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
+    took_s = check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
     watchdog = f"set to {1000 * drops_after_s:.1f} ms; without forces the device let go within {1000 * took_s:.0f} ms"
     return [*findings, DeviceFinding("Watchdog", watchdog, fine=True), _masses(model, lab), _gravity(handle)]
 

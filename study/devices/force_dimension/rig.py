@@ -1,6 +1,6 @@
 """A device of the vendor as a rig: readings, forces, and everything that releases its force.
 
-Beyond what the safety layer does, a force above the cap or no number is never sent (`halves`), and the library is told
+Beyond what the safety layer does, a force above the cap or no number is never sent (`tick_io`), and the library is told
 the cap as well. Anything odd ends in an error: the safety layer then writes zero, and the watchdog sees to the rest.
 """
 
@@ -14,10 +14,10 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
-from study.devices.force_dimension import halves, loop_cells
-from study.devices.force_dimension.halves import LOCK_S
+from study.devices.force_dimension import loop_cells, tick_io
 from study.devices.force_dimension.handle import Handle, why_off
 from study.devices.force_dimension.library import LibraryError
+from study.devices.force_dimension.tick_io import LOCK_S
 from study.devices.native import SharedLock, system_calls
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, Halves, Sensed
 from study.errors import DeviceError
@@ -79,11 +79,11 @@ class ForceDimensionRig:
         """The two halves of a compiled tick; None with an accelerometer that compiled code cannot read."""
         if self._overlaid is not None:
             return None
-        return Halves(halves.sense_once, halves.write_once, self._calls, self._cells, self._samples, self._error)
+        return Halves(tick_io.sense_once, tick_io.write_once, self._calls, self._cells, self._samples, self._error)
 
     def sense(self) -> FloatArray:
         reading = np.empty(READING_SIZE)
-        self._raise_for(halves.sense_once(self._calls, self._cells, self._samples, reading))
+        self._raise_for(tick_io.sense_once(self._calls, self._cells, self._samples, reading))
         if self._overlaid is not None:
             reading[ACCELERATION], clipped = self._overlaid.latest()
             reading[SENSOR_CLIPPED] = float(clipped)
@@ -94,7 +94,7 @@ class ForceDimensionRig:
         return frozenset(bit for bit in range(32) if mask >> bit & 1)
 
     def write(self, force_n: FloatArray) -> None:
-        self._raise_for(halves.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
+        self._raise_for(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
         return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
@@ -156,7 +156,7 @@ class ForceDimensionRig:
             with self._sending:
                 resting = cells[loop_cells.SENT_ZERO] and time.monotonic() - cells[loop_cells.SENT_S] >= every_s
                 if resting and not self._closed.is_set():
-                    code = halves.send_once(self._calls, cells, zero)
+                    code = tick_io.send_once(self._calls, cells, zero)
                     if code:
                         self._error(code)
                         return

@@ -1,4 +1,4 @@
-"""Builds the rig of a named device: library, device, watchdog and its proof, gravity compensation."""
+"""Builds the rig of a named device: library, device, watchdog and its test, gravity compensation."""
 
 import time
 from dataclasses import replace
@@ -13,7 +13,7 @@ from study.devices.force_dimension.lab import LabSettings, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rig import ForceDimensionRig
-from study.devices.force_dimension.watchdog_proof import prove_watchdog
+from study.devices.force_dimension.watchdog_check import check_watchdog
 
 RATE_HZ = 1000.0
 
@@ -46,7 +46,7 @@ def _rig(
         cap_n = min(settings.limits.total_cap_n, model.max_force_n)
         drops_after_s = make_ready(handle, model, cap_n, lab.effector_mass_kg)
         if drops_after_s > 0:
-            prove_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
+            check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
     except LibraryError as error:
         handle.let_go()

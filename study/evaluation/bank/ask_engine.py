@@ -16,7 +16,7 @@ from study.evaluation.bank.proof_folder import ANSWER, DIED, RECORDING, ProofFol
 from study.evaluation.bank.proof_seals import read_answer
 from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.text_file import read_text, write_text
-from study.workflows.pieces import finished_pieces
+from study.workflows.run_on_executor import finished_pieces
 
 PATIENCE_S = 1200.0
 """Longest wait for one case (s); a case takes seconds to a minute."""

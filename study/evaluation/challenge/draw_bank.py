@@ -1,7 +1,7 @@
 """Contents of a bank: the case drawn for each number, so that any part of it is a fair sample of the whole.
 
 Of every forty: ten with nothing missing, eighteen with one effect, four with two, four outside the catalogue, and four
-where the diagnosis must do without the true effect. One in eight has more hidden extras, one in eight comes from a
+where the diagnosis must do without the true effect. One in eight has more concealed extras, one in eight comes from a
 second physics engine.
 """
 

@@ -13,7 +13,7 @@ COLUMNS = 7
     SPEED_POWER, PLACE_POWER, PLACE_DRAG, SPEED_SPRING, ATTRACTION, SOFT_DRAG, SOFT_SPRING, FADING_DRAG, CONTACT,
     EDGE_DRAG, GAIN_RIPPLE, PUMPED, RELAXATION, HEATING, CROSS_SQUARE, CROSS_SPRING, CROSS_DRAG, WHIRL, ALL_DRAG,
 ) = range(19)  # fmt: skip
-"""Kinds: of the axis's own motion, then with more, then across; `LAW_KINDS` in `hidden_laws` says what each is."""
+"""Kinds: of the axis's own motion, then with more, then across; `LAW_KINDS` in `concealed_laws` says what each is."""
 
 
 @njit(cache=True, nogil=True)

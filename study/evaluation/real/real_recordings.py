@@ -19,14 +19,14 @@ from study.errors import StudyError, UserInterruptError, WrongUseError, resumabl
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
 from study.evaluation.real.inject_real import carriers, run_injections
-from study.evaluation.real.kept_answers import (
+from study.evaluation.real.real_folder import RealFolder, RealRecording, read_real_folder
+from study.evaluation.real.reuse_answers import (
     ANSWER_NAME,
     INJECTED_NAME,
     answer_place,
-    kept_answers,
     origin_of_answer,
+    reusable_answers,
 )
-from study.evaluation.real.real_folder import RealFolder, RealRecording, read_real_folder
 from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_time
@@ -39,7 +39,7 @@ from study.store.formats.real_answer_file import read_answer_and_origin, write_r
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 from study.workflows.forked_map import processor_s, unforked
-from study.workflows.pieces import finished_pieces
+from study.workflows.run_on_executor import finished_pieces
 
 RETUNED_NAME = "retuned.toml"
 DIAGNOSED_OF_BOTH = 0.5
@@ -84,7 +84,7 @@ def diagnose_folder(
         )
     found = _found(plan)
     time = clock or RealClock()
-    kept = kept_answers(plan.out, found.recordings, plan.seconds)
+    kept = reusable_answers(plan.out, found.recordings, plan.seconds)
     _make_writable(plan.out)
     saved = f"What was answered so far is in {plan.out}."
     with resumable("Not all recordings were diagnosed.", saved, also=(UserInterruptError,)):

@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from protocols.document.refusals import key_path, nearest_key, shown
 from protocols.document.schema import Node, Place, describe_allowed, keys_of, node_at, resolve_reference
+from protocols.document.validation_messages import key_path, nearest_key, shown
 from study.importing.map_format.import_map import ImportMap
 from study.store.disk.file_errors import UnusableFileError
 

@@ -40,7 +40,7 @@ def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
     )
 
 
-def proof_notice(device: str, force_n: float) -> str:
+def limit_test_notice(device: str, force_n: float) -> str:
     """Notice before the proof that a device's cap holds and that it lets go: without a spring, so the handle moves
     freely."""
     return (

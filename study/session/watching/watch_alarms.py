@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.facts.log_time import Moment, elapsed_s, seconds_between
 from study.session.facts.void_reasons import computer_too_busy
+from study.session.watching.followed_session import Watched
 from study.session.watching.live import Live
 from study.session.watching.watch_view import ON, Alarm, DriftLine, Exposure, Standing
-from study.session.watching.watched import Watched
 
 SILENT_AFTER_S = 3.0
 """`live.json` is written about four times a second; a slow disk may delay it by a second or two."""

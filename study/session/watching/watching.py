@@ -7,11 +7,8 @@ from study.session.facts.log_time import Moment, seconds_between
 from study.session.state.sitting_state import SittingState, dose_now, pass_time
 from study.session.state.vibration_dose import a8_mps2
 from study.session.views.archive_views import TURNED_AWAY
-from study.session.watching.live import Live
-from study.session.watching.watch_alarms import Situation, alarms_of
-from study.session.watching.watch_view import ON, DriftLine, Exposure, Standing, WatchView
-from study.session.watching.watched import Watched
-from study.session.watching.watched_trials import (
+from study.session.watching.followed_session import Watched
+from study.session.watching.followed_trials import (
     last_trials,
     next_level_n,
     open_trial,
@@ -20,6 +17,9 @@ from study.session.watching.watched_trials import (
     run_line,
     shown_run,
 )
+from study.session.watching.live import Live
+from study.session.watching.watch_alarms import Situation, alarms_of
+from study.session.watching.watch_view import ON, DriftLine, Exposure, Standing, WatchView
 
 
 @dataclass(frozen=True, slots=True)

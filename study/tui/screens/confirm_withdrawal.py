@@ -10,12 +10,12 @@ from textual.widgets import Footer, Input
 
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 
-class ConfirmWithdrawal(SpokenScreen[bool], ModalScreen[bool]):
+class ConfirmWithdrawal(TranslatedScreen[bool], ModalScreen[bool]):
     """Returns True if the word was typed."""
 
     PAGE = "help_withdraw"

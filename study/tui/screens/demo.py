@@ -13,13 +13,13 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import felt_so_far
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
 
-class DemoScreen(SpokenScreen[DemoChoice]):
+class DemoScreen(TranslatedScreen[DemoChoice]):
     PAGE = "help_demo"
     DEFAULT_CSS = """
     DemoScreen #title { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }

@@ -24,7 +24,7 @@ from study.session.views.form_entry import (
 )
 from study.session.views.form_views import Form, FormReply, find_missing_fields
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import limits_words, origin
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.choice_row import ChoiceRow
@@ -46,7 +46,7 @@ KEYS = (
 FOOTER_KEYS = frozenset(key for key, *_ in KEYS)
 
 
-class FormScreen(SpokenScreen[FormReply]):
+class FormScreen(TranslatedScreen[FormReply]):
     """Shows a `FormEntry`. No widget in it has the focus: keys, clicks and pastes come to the screen in order, and
     each is applied to the entry before the next."""
 

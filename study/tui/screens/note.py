@@ -12,7 +12,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.watching.requests import NoteAsked, Who
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.literal_text import LiteralText
@@ -21,7 +21,7 @@ MOST_CHARACTERS = 500
 WRITERS: tuple[Who, ...] = ("participant", "experimenter")
 
 
-class NoteScreen(SpokenScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
+class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
     """Returns None if nothing is to be written."""
 
     PAGE = "help_note"

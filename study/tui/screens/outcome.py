@@ -14,7 +14,7 @@ from textual.widgets import Footer, Static
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 
 Decision = Literal["resume", "look", "home", "quit", "back"]
 
@@ -49,7 +49,7 @@ class Outcome:
     """In which a participant is told what to do."""
 
 
-class OutcomeScreen(SpokenScreen[Decision], ModalScreen[Decision]):
+class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
     HELP = HELP
     CSS = """
     OutcomeScreen { align: center middle; }

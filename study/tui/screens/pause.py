@@ -16,7 +16,7 @@ from study.session.watching.requests import NoteAsked
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.note import NoteScreen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
@@ -27,7 +27,7 @@ CHOICES = {
 }
 
 
-class PauseScreen(SpokenScreen[AfterPause]):
+class PauseScreen(TranslatedScreen[AfterPause]):
     """leaving: the participant asked to leave, so that choice is highlighted."""
 
     PAGE = "help_pause"

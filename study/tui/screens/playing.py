@@ -10,13 +10,13 @@ from textual.widgets import Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import PlayingNotice, Unanswered
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
 
-class PlayingScreen(SpokenScreen[Unanswered | None]):
+class PlayingScreen(TranslatedScreen[Unanswered | None]):
     """The application closes it when the time is over."""
 
     PAGE = "help_playing"

@@ -11,7 +11,7 @@ from textual.widgets import Digits, Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import RestNotice
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import progress_sentence
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
@@ -19,7 +19,7 @@ from study.tui.widgets.literal_text import LiteralText
 TICK_S = 0.2
 
 
-class RestScreen(SpokenScreen[float]):
+class RestScreen(TranslatedScreen[float]):
     """Returns the seconds rested, never fewer than requested."""
 
     PAGE = "help_rest"

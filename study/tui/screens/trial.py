@@ -16,7 +16,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Answered, Question, Reply, Task, Unanswered
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.keys.key_presses import KeyPresses, arrival_s
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER, repeat_words
 from study.tui.trial_words import heading, run_key
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
@@ -36,7 +36,7 @@ NUM_LOCK = {"end", "down", "kp_begin"}
 """Keys that a number pad's 1 and 2 send while Num Lock is off."""
 
 
-class TrialScreen(SpokenScreen[None]):
+class TrialScreen(TranslatedScreen[None]):
     """One per sitting: armed for each question, inactive in between."""
 
     PAGE = "help_trial"

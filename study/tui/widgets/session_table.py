@@ -14,7 +14,7 @@ from study.local_clock import machine_zone
 from study.session.views.archive_views import SessionLine
 from study.session.views.local_time import local_column
 from study.tui.home_messages import ResumeWanted, SessionWanted, WatchWanted
-from study.tui.standing_words import STYLES, standing_words
+from study.tui.session_status import STYLES, status_text
 
 _NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = "Session", "Standing", "Begun", "Runs", "Answers", "Protocol"
 _FIXED = {_STANDING: 12, _RUNS: 5, _ANSWERS: 7}
@@ -131,5 +131,5 @@ class SessionTable(DataTable[Content | str]):
         known = line.standing in ("finished", "unfinished", "running")
         runs = (f"{line.runs_done}/{line.runs}" if known else "",) if _RUNS in self._widths else ()
         answers = (f"{line.answers:>7}" if known else "",) if _ANSWERS in self._widths else ()
-        standing = Content.styled(standing_words(line.standing), STYLES[line.standing])
+        standing = Content.styled(status_text(line.standing), STYLES[line.standing])
         return Content(line.name), standing, begun, *runs, *answers, Content(protocol)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from study.devices.clock import Clock, RealClock
 from study.devices.device import Device, DeviceSettings
-from study.devices.opening import accept_device, examine_device, needs_real_time, open_device, proof_force_n
+from study.devices.opening import accept_device, examine_device, limit_test_force_n, needs_real_time, open_device
 from study.errors import DeviceError, ExitCode, WrongUseError
 from study.session.stimulus.timing_verdict import judge_load
-from study.session.views.handle_notice import proof_notice
+from study.session.views.handle_notice import limit_test_notice
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.checks.bare_loop import judge_beside, timed_beside
@@ -137,7 +137,7 @@ def accept(name: str, examination: Examination, operator: str, moving: Moving) -
         raise DeviceError("The device was not accepted", f"Not fine: {found}.", "Mend that first, as said above.")
     sensed = examination.sensed
     baseline = record_baseline(name, moving) if sensed else ("", "")
-    moving.announce(proof_notice(name, proof_force_n()))
+    moving.announce(limit_test_notice(name, limit_test_force_n()))
     settings = replace(_settings(name, 0.0), with_sensor=sensed)
     sentence = accept_device(name, settings, RealClock(), operator, baseline)
     return sentence if sensed else f"{sentence}. Without an accelerometer no daily check will be possible."

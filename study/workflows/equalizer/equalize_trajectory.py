@@ -9,7 +9,7 @@ import numpy as np
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.tracking.bands.narrow_and_wide_models import BandFacts, banded_feedforward
-from equalizer.tracking.compensation.known_physics import Compensation, compensate
+from equalizer.tracking.compensation.effect_compensation import Compensation, compensate
 from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
 from equalizer.tracking.lqr.limits import ForceLimitError, Peaks, require_under_cap

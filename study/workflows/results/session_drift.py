@@ -9,8 +9,8 @@ from analysis.device_change.probe_lines import probe_lines
 from equalizer.signals.recording import Recording
 from protocols.definition.probes import PERIOD_S
 from study.errors import StudyError
+from study.session.watching.followed_session import PlayedProbe
 from study.session.watching.watch_view import DriftLine
-from study.session.watching.watched import PlayedProbe
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import SessionFolder
 

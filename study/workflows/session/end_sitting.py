@@ -5,7 +5,7 @@ from dataclasses import replace
 from study.devices.device import Fault
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.void_reasons import TOO_BUSY
-from study.session.views.counted import answers_are
+from study.session.views.count_text import answers_are
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.analysis_files import ANALYSIS_NAME, is_analysis_of

@@ -18,9 +18,9 @@ from study.store.disk.new_folder import new_folder
 from study.store.disk.privacy import make_folder
 from study.store.disk.provenance import sha256_of
 from study.store.sessions.archive import SessionFolder, session_folders
-from study.workflows.pieces import finished_pieces
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
+from study.workflows.run_on_executor import finished_pieces
 from study.workflows.session.conduct_session import Conducted, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import create_participant

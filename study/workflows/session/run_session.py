@@ -15,7 +15,7 @@ from study.session.state.probing import Probe, Reference
 from study.session.state.progress import progress
 from study.session.state.state import SessionState, felt
 from study.session.views.archive_views import TURNED_AWAY
-from study.session.views.counted import answers_are
+from study.session.views.count_text import answers_are
 from study.session.views.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
 from study.store.sessions.log_seal import seal_log
 from study.workflows.results.fold_session import fold_session

@@ -10,12 +10,12 @@ from study.session.facts.events import SessionOpened, parse_event
 from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained
 from study.session.facts.log_time import seconds_between
 from study.session.state.draw_check import LogContradiction
+from study.session.watching.followed_session import Watched, begin_watching
+from study.session.watching.followed_session import follow as after
 from study.session.watching.live import Live
 from study.session.watching.requests import Request
 from study.session.watching.watch_alarms import SILENT_AFTER_S
 from study.session.watching.watch_view import DriftLine, WatchView
-from study.session.watching.watched import Watched, begin_watching
-from study.session.watching.watched import follow as after
 from study.session.watching.watching import LiveInfo, watch_view
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live

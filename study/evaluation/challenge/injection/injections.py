@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.injection.axis_motion import axis_motion, takes_of
 from study.evaluation.challenge.injection.drive_injections import ForceInjection
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
-from study.evaluation.challenge.injection.spoiled_readings import (
+from study.evaluation.challenge.injection.reading_faults import (
     clip,
     cross,
     cubic,

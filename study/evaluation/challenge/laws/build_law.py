@@ -9,7 +9,7 @@ from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 from study.evaluation.challenge.law_kernel import law_force, law_memory
-from study.evaluation.challenge.laws.hidden_laws import LawKind, Random, Sizes
+from study.evaluation.challenge.laws.concealed_laws import LawKind, Random, Sizes
 from study.evaluation.challenge.mechanism_kernel import Motion
 
 WEAKEST, STRONGEST = 0.015, 0.25

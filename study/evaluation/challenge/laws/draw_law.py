@@ -18,7 +18,7 @@ from study.evaluation.challenge.draw_case import EFFECTS, Case, Concealed, draw_
 from study.evaluation.challenge.drive_plan import RATE_HZ, DrivePlan, draw_plan, multisine
 from study.evaluation.challenge.extras import with_extras
 from study.evaluation.challenge.laws.build_law import LawTruth, build_law
-from study.evaluation.challenge.laws.hidden_laws import LAW_KINDS, LAW_OF_NAME
+from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, LAW_OF_NAME
 from study.evaluation.challenge.mechanism_kernel import Motion
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import Rig

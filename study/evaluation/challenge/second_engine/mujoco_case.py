@@ -9,6 +9,7 @@ import numpy as np
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.concealed_effect import EffectContext, Values
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.draw_case import (
     EFFECTS,
@@ -21,7 +22,6 @@ from study.evaluation.challenge.draw_case import (
     visibility,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
-from study.evaluation.challenge.hidden import EffectContext, Values
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.second_engine.mujoco_bench import MujocoBench, bare, linear, simulate_motion, with_delay

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from study.evaluation.challenge.concealed_effect import EffectContext
 from study.evaluation.challenge.device import Device, record
 from study.evaluation.challenge.draw_case import DECOYS, EFFECTS
-from study.evaluation.challenge.hidden import EffectContext
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
 NEUTRAL = {

@@ -7,10 +7,10 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
+from equalizer.effects.command_sign import SIGN_REVERSED, SWAPPED, TILTED, with_reversed_commands
 from equalizer.effects.discovered_law import Channels
 from equalizer.effects.placing import place_effects, place_of_effect
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.effects.turned_commands import SWAPPED, TILTED, TURNED, with_turned_commands
 from equalizer.laws.law import law_of
 from equalizer.plant.mechanical_model import ModelEffect
 
@@ -61,7 +61,7 @@ def apart(bench, effect: ModelEffect) -> float:
     """What turning changes in the answer, over what the effect does; and the effect does something."""
     plain = bench.three_axes()
     model = replace(plain, effects=(effect,))
-    turned = with_turned_commands(model, WAY, INPUTS, OUTPUTS)
+    turned = with_reversed_commands(model, WAY, INPUTS, OUTPUTS)
     before = simulate_mechanism(model, COMMANDS, RATE_HZ, place_effects(model, Channels(INPUTS, OUTPUTS)))
     after = simulate_mechanism(turned, COMMANDS * WAY, RATE_HZ, place_effects(turned, Channels(INPUTS, OUTPUTS)))
     without = simulate_mechanism(plain, COMMANDS, RATE_HZ)
@@ -105,13 +105,13 @@ def test_a_stop_beyond_zero_pushes_as_its_law_written_out(bench):
 
 def test_every_effect_that_pushes_or_is_pushed_was_turned():
     assert {each.name for each in CATALOGUE if place_of_effect(each) != "sensor"} <= set(NUMBERS)
-    assert {*TURNED, *SWAPPED, *TILTED} <= set(NUMBERS)
+    assert {*SIGN_REVERSED, *SWAPPED, *TILTED} <= set(NUMBERS)
 
 
 def test_an_effect_of_all_axes_is_split_where_some_turn(bench):
     effect = ModelEffect("constant_force", None, {"force": 0.3})
     assert apart(bench, effect) < 1e-9
-    turned = with_turned_commands(replace(bench.three_axes(), effects=(effect,)), WAY, INPUTS, OUTPUTS)
+    turned = with_reversed_commands(replace(bench.three_axes(), effects=(effect,)), WAY, INPUTS, OUTPUTS)
     assert [(each.axis, each.parameters["force"]) for each in turned.effects] == [("x", 0.3), ("y", -0.3), ("z", 0.3)]
 
 

@@ -4,7 +4,7 @@ from concurrent.futures import Executor, Future
 
 import pytest
 
-from study.workflows.pieces import finished_pieces
+from study.workflows.run_on_executor import finished_pieces
 
 
 class AtOnce(Executor):

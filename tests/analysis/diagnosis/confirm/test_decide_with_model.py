@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.confirm import laws_with_model as beside_given
+from analysis.diagnosis.confirm import decide_with_model as beside_given
 from analysis.diagnosis.confirm.balance_with_model import find_balances_beside_model
+from analysis.diagnosis.confirm.decide_with_model import objection
 from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_something
-from analysis.diagnosis.confirm.laws_with_model import objection
 from analysis.diagnosis.search.time_budget import always
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from study.devices.force_dimension import findings, watchdog_proof
+from study.devices.force_dimension import findings, watchdog_check
 from study.devices.force_dimension.handle import Handle
-from study.devices.force_dimension.watchdog_proof import MARGIN_S, prove_watchdog
+from study.devices.force_dimension.watchdog_check import MARGIN_S, check_watchdog
 from study.errors import DeviceError
 
 WATCHDOG_S = 0.03
@@ -36,7 +36,7 @@ def handle(stepped_stub):
 
 def proved(stub, handle: Handle, watchdog_s: float = WATCHDOG_S) -> float:
     time = SteppedTime(stub)
-    return prove_watchdog(handle, handle.arm_watchdog(watchdog_s), time.now_s, time.sleep)
+    return check_watchdog(handle, handle.arm_watchdog(watchdog_s), time.now_s, time.sleep)
 
 
 @pytest.mark.parametrize("watchdog_s", [0.005, 0.02, 0.03])
@@ -76,11 +76,11 @@ def test_a_force_that_went_off_for_another_reason_proves_nothing(stepped_stub, h
             stepped_stub.set("off_by", 5)
 
     with pytest.raises(DeviceError, match="for another reason: the USB connection broke"):
-        prove_watchdog(handle, handle.arm_watchdog(WATCHDOG_S), time.now_s, sleep)
+        check_watchdog(handle, handle.arm_watchdog(WATCHDOG_S), time.now_s, sleep)
 
 
 def test_only_zero_forces_are_ever_sent_past_the_safety_layer():
     """By the source: these files write to a device without the governor."""
-    for module in (findings, watchdog_proof):
+    for module in (findings, watchdog_check):
         source = Path(module.__file__).read_text()
         assert source.count("set_force(") == source.count("set_force(0.0, 0.0, 0.0)") > 0

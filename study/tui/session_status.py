@@ -23,7 +23,7 @@ STYLES: dict[Standing, str] = {
 }
 
 
-def standing_words(standing: Standing) -> str:
+def status_text(standing: Standing) -> str:
     """Symbol and word."""
     return f"{SYMBOLS[standing]} {standing}"
 

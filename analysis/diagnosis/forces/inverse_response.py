@@ -26,7 +26,7 @@ RIGHT_TO = 1e-8
 """Largest relative error at lines that were not fitted; above it all lines are solved for."""
 
 
-def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:
+def inverse_response(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:
     """(lines, 2 m, m): from the positions of the model's first m outputs to the forces along the driven axes, and to
     the axes' positions. Raises numpy.linalg.LinAlgError where these outputs do not determine the model's motion."""
     n, m = model.coordinates, model.inputs
@@ -40,11 +40,13 @@ def inverse_lines(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexAr
     return np.concatenate([solved[:, n:], driven_axes(model).T @ solved[:, :n]], axis=1)
 
 
-def inverse_of(model: MechanicalModel, lines: int, highest_hz: float) -> Callable[[FloatArray], ComplexArray]:
-    """`inverse_lines` as a function of frequency, fast for many lines."""
+def fast_inverse_response(
+    model: MechanicalModel, lines: int, highest_hz: float
+) -> Callable[[FloatArray], ComplexArray]:
+    """`inverse_response` as a function of frequency, fast for many lines."""
     if lines > FEW and (learned := _fit_partial_fractions(model, highest_hz)) is not None:
         return learned
-    return lambda frequency_hz: inverse_lines(model, frequency_hz)
+    return lambda frequency_hz: inverse_response(model, frequency_hz)
 
 
 def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callable[[FloatArray], ComplexArray] | None:
@@ -52,7 +54,7 @@ def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callabl
     large."""
     poles = zeros_of(model, 2 * np.pi * FAR * highest_hz)
     tried, unit, m = _lines_to_fit(poles, highest_hz), 2 * np.pi * highest_hz, model.inputs
-    right, shapes = inverse_lines(model, tried), _basis_functions(tried, poles, unit)
+    right, shapes = inverse_response(model, tried), _basis_functions(tried, poles, unit)
     # Forces and positions are fitted separately, and each line is scaled: entries differ by many orders of magnitude.
     forces, positions = (
         _fit_coefficients(shapes, part.reshape(len(tried), -1)) for part in (right[:, :m], right[:, m:])
@@ -65,7 +67,7 @@ def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callabl
         found: ComplexArray = (_basis_functions(frequency_hz, poles, unit) @ numbers).reshape(-1, 2 * m, m)
         slow = frequency_hz < tried[0]
         if slow.any():
-            found[slow] = inverse_lines(model, frequency_hz[slow])
+            found[slow] = inverse_response(model, frequency_hz[slow])
         return found
 
     return lines

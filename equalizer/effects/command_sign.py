@@ -17,7 +17,7 @@ from equalizer.laws.tree import Apply, Node, Variable, format_formula
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.signal import FloatArray
 
-TURNED: Mapping[str, tuple[str, ...]] = {
+SIGN_REVERSED: Mapping[str, tuple[str, ...]] = {
     "constant_force": ("force",), "position_dependent_friction": ("slope_per_m",), "asymmetric_stiffness": ("k2",),
     "gravity_torque": ("angle",), "cogging": ("phase",), "end_stop": ("position", "side"),
     "pose_dependent_inertia": ("per_m",),
@@ -28,43 +28,43 @@ TILTED = {"extra_mode": ("tilt_next", "tilt_after_next")}
 """Numbers that couple an axis to those after it."""
 
 
-def with_turned_commands(
+def with_reversed_commands(
     model: MechanicalModel, signs: Sequence[float], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> MechanicalModel:
     """Return the model whose answer to the command times `signs`, 1 or -1 each, is that of `model` to the command.
     Raises PlacingError."""
     way = np.asarray(signs, dtype=np.float64)
-    effects = [each for effect in model.effects for each in _turned_effects(model, effect, way, (inputs, outputs))]
+    effects = [each for effect in model.effects for each in _reversed_effects(model, effect, way, (inputs, outputs))]
     return replace(model, input=model.input * way, effects=tuple(effects))
 
 
-def _turned_effects(
+def _reversed_effects(
     model: MechanicalModel, effect: ModelEffect, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]
 ) -> tuple[ModelEffect, ...]:
     """One; one per axis where it differs with the direction and stood at all of them."""
     inputs, outputs = channels
-    if effect.law is None and effect.kind not in (*TURNED, *SWAPPED, *TILTED):
+    if effect.law is None and effect.kind not in (*SIGN_REVERSED, *SWAPPED, *TILTED):
         return (effect,)
     if effect.law is not None and effect.law.acts_on == "response":
         return (effect,)
     sites = find_sites(effect, inputs, outputs)
     if effect.law is not None:
-        return (replace(effect, law=_turned_law(effect.law, sites[0], way, channels)),)
+        return (replace(effect, law=_reversed_law(effect.law, sites[0], way, channels)),)
     letters = [effect.axis] if effect.axis is not None else [axis_letter(inputs[site], inputs) for site in sites]
     return tuple(
-        replace(effect, axis=letter, parameters=_turned_numbers(effect, site, way))
+        replace(effect, axis=letter, parameters=_reversed_parameters(effect, site, way))
         for site, letter in zip(sites, letters, strict=True)
     )
 
 
-def _turned_numbers(effect: ModelEffect, site: int, way: FloatArray) -> dict[str, float]:
+def _reversed_parameters(effect: ModelEffect, site: int, way: FloatArray) -> dict[str, float]:
     numbers = dict(effect.parameters)
     for place, name in enumerate(TILTED.get(effect.kind, ()), start=1):
         if name in numbers:
             numbers[name] *= float(way[site] * way[(site + place) % len(way)])
     if way[site] > 0:
         return numbers
-    for turned in TURNED.get(effect.kind, ()):
+    for turned in SIGN_REVERSED.get(effect.kind, ()):
         if turned in numbers:
             numbers[turned] = -numbers[turned]
     if effect.kind in SWAPPED:
@@ -73,7 +73,7 @@ def _turned_numbers(effect: ModelEffect, site: int, way: FloatArray) -> dict[str
     return numbers
 
 
-def _turned_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
+def _reversed_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
     """The formula with the signals of reversed axes negated, and its value too where its own axis is reversed."""
     inputs, outputs = channels
     letters, against = axis_names(inputs), set[str]()

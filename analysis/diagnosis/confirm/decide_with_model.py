@@ -34,7 +34,7 @@ from equalizer.signals.recording import Recording
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResultBesideModel:
+class ResultWithModel:
     """A search's result after the decision by held-out gain, and the force balances that were used for it."""
 
     result: SearchResult
@@ -42,30 +42,30 @@ class ResultBesideModel:
     """Empty where nothing is missing, or no motion was measured."""
 
 
-def judge_with_model(
+def decide_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, result: SearchResult, time_left: TimeBudget
-) -> ResultBesideModel:
+) -> ResultWithModel:
     """The result by held-out gain, and the balances beside the model. seen: the result of the search by simulation."""
     if result.judgement.verdict not in ("unexplained", "partly_explained") or result.found.statistic is not None:
-        return ResultBesideModel(result)
+        return ResultWithModel(result)
     known_noise = all(floor.how == "repeats" for floor in fitting.chosen.floors)
     balances = find_balances_beside_model(recordings, fitting.model, result.context.barred, time_left)
     near = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
     if result.judgement.named or result.found.barred:
-        return ResultBesideModel(result, balances)
+        return ResultWithModel(result, balances)
     if known_noise and near:
         why_not = "the noise is known here, and what it leaves is more than noise"
-        return ResultBesideModel(
+        return ResultWithModel(
             replace(result, unconfirmed=(*result.unconfirmed, *_unconfirmed_candidates(result, why_not))), balances
         )
     why_not = objection(result, balances)
     if result.found.steps and not why_not:
-        return ResultBesideModel(replace(result, judgement=Judgement("partly_explained", True)), balances)
+        return ResultWithModel(replace(result, judgement=Judgement("partly_explained", True)), balances)
     found = search_by_balance(result.context, balances, known_noise) if balances else None
     if found is not None and not objection(found, balances):
         judged = replace(found.judgement, verdict="partly_explained")
-        return ResultBesideModel(replace(found, judgement=judged, remarks=result.remarks), balances)
-    return ResultBesideModel(
+        return ResultWithModel(replace(found, judgement=judged, remarks=result.remarks), balances)
+    return ResultWithModel(
         replace(result, unconfirmed=(*result.unconfirmed, *_unconfirmed_candidates(result, why_not))), balances
     )
 

@@ -17,7 +17,7 @@ from analysis.diagnosis.balance.structures import SLIDING, Structure, is_better
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
 
 DEAD_BAND = "force_deadband"
-TWINS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND: "coulomb_friction"}
+EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND: "coulomb_friction"}
 BACKWARDS = "it never moves backwards"
 
 
@@ -35,7 +35,7 @@ def doubt_laws_of_actuator(balance: Balance) -> Balance:
 def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
     regression, effect = balance.search.regression, judged.law.effect
     if judged.named and effect == DEAD_BAND and judged.place == NO_COLUMN and _rests_within(regression):
-        return replace(judged, alike=tuple(dict.fromkeys((*judged.alike, TWINS[DEAD_BAND]))))
+        return replace(judged, alike=tuple(dict.fromkeys((*judged.alike, EQUIVALENT_LAWS[DEAD_BAND]))))
     if not judged.named or judged.law.channel < 0:
         return judged
     if effect in SLIDING and not _reverses(regression, judged.law.channel):
@@ -44,8 +44,8 @@ def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
         rubs = any(each.law.effect in SLIDING and each.law.channel == judged.law.channel for each in balance.named)
         if rubs and not _reverses(regression, judged.law.channel):
             return _doubted(judged, "force_nonlinearity", BACKWARDS)
-    if effect in TWINS and not _has_inertia(regression, balance.chosen.laws):
-        return _doubted(judged, TWINS[effect], "no inertia shows")
+    if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
+        return _doubted(judged, EQUIVALENT_LAWS[effect], "no inertia shows")
     return judged
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.forces import inverse_lines as learning
-from analysis.diagnosis.forces.inverse_lines import inverse_lines, inverse_of
+from analysis.diagnosis.forces import inverse_response as learning
+from analysis.diagnosis.forces.inverse_response import fast_inverse_response, inverse_response
 from equalizer.plant.mechanical_model import MechanicalModel
 
 RATE_HZ = 1000.0
@@ -27,7 +27,7 @@ def device(coupling_n_s_per_m: float) -> MechanicalModel:
 @pytest.mark.parametrize("coupling", [0.0, 8.0])
 def test_all_lines_follow_from_a_few(coupling):
     model = device(coupling)
-    wanted, found = inverse_lines(model, LINES), inverse_of(model, len(LINES), RATE_HZ / 2)(LINES)
+    wanted, found = inverse_response(model, LINES), fast_inverse_response(model, len(LINES), RATE_HZ / 2)(LINES)
     for part in (slice(0, 2), slice(2, 4)):
         scale = np.abs(wanted[:, part]).max(axis=(1, 2), keepdims=True)
         assert (np.abs(found - wanted)[:, part] / scale).max() < 1e-7
@@ -36,5 +36,5 @@ def test_all_lines_follow_from_a_few(coupling):
 
 def test_where_few_lines_do_not_foretell_the_others_all_are_solved_for(monkeypatch):
     monkeypatch.setattr(learning, "zeros_of", lambda model, largest: np.array([-3.0 + 40.0j]))
-    found = inverse_of(device(8.0), len(LINES), RATE_HZ / 2)(LINES)
-    assert np.array_equal(found, inverse_lines(device(8.0), LINES))
+    found = fast_inverse_response(device(8.0), len(LINES), RATE_HZ / 2)(LINES)
+    assert np.array_equal(found, inverse_response(device(8.0), LINES))

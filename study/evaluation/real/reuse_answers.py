@@ -15,7 +15,7 @@ ANSWER_NAME, INJECTED_NAME = "answer.json", "injected"
 
 
 @dataclass(frozen=True, slots=True)
-class _Kept:
+class _EarlierAnswer:
     place: Path
     answer: RealAnswer
     changes: tuple[str, ...]
@@ -33,17 +33,17 @@ def origin_of_answer(real_recording: RealRecording, seconds: float | None) -> Pr
     return gather_provenance(parents=files, settings={"seconds": seconds})
 
 
-def kept_answers(out: Path, wanted: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
+def reusable_answers(out: Path, wanted: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
     """Earlier answers by folder; nothing is written. Raises StudyError where one is damaged or was made from other
     inputs."""
     there = [each for each in wanted if (answer_place(out, each) / ANSWER_NAME).is_file()]
-    kept = [_kept(answer_place(out, each), each, seconds) for each in there]
+    kept = [_read_earlier_answer(answer_place(out, each), each, seconds) for each in there]
     if outdated := [each for each in kept if each.changes]:
-        raise _made_otherwise(out, outdated)
+        raise _inputs_changed_error(out, outdated)
     return {each.place: each.answer for each in kept}
 
 
-def _kept(place: Path, real_recording: RealRecording, seconds: float | None) -> _Kept:
+def _read_earlier_answer(place: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
     try:
         answer, origin = read_answer_and_origin(place / ANSWER_NAME)
     except StudyError as error:
@@ -55,7 +55,7 @@ def _kept(place: Path, real_recording: RealRecording, seconds: float | None) -> 
         ) from error
     now = origin_of_answer(real_recording, seconds)
     files = {(parent.file, parent.sha256) for parent in now.parents}
-    return _Kept(place, answer, (*_file_changes(_files_in(origin), files), *_setting_changes(origin, seconds)))
+    return _EarlierAnswer(place, answer, (*_file_changes(_files_in(origin), files), *_setting_changes(origin, seconds)))
 
 
 def _files_in(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
@@ -86,7 +86,7 @@ def _seconds(limit_s: float | None) -> str:
     return "left out" if limit_s is None else f"{limit_s:g}"
 
 
-def _made_otherwise(out: Path, outdated: Sequence[_Kept]) -> StudyError:
+def _inputs_changed_error(out: Path, outdated: Sequence[_EarlierAnswer]) -> StudyError:
     texts = (f"{each.place.relative_to(out) / ANSWER_NAME}: {', '.join(each.changes)}." for each in outdated)
     places = [str(each.place) for each in outdated]
     if (injected := out / INJECTED_NAME).exists():

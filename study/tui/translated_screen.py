@@ -11,7 +11,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 Reply = TypeVar("Reply")
 
 
-class SpokenScreen(Screen[Reply]):
+class TranslatedScreen(Screen[Reply]):
     """Bindings are written in English; what the footer shows of them is looked up, word by word."""
 
     PAGE: ClassVar[str] = ""

@@ -9,7 +9,7 @@ from study.devices.rig import ACCELERATION, POSITION, SENSOR_CLIPPED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class LastReading:
     """One reading. Replaced as a whole and never changed, so that any thread may read it."""
 
     reading: FloatArray
@@ -17,7 +17,7 @@ class Seen:
     buttons: frozenset[int]
 
 
-def look_of(last: Seen | None, missed_ticks: int) -> Look:
+def look_of(last: LastReading | None, missed_ticks: int) -> Look:
     """The look that screens may show; without a reading where nothing was read."""
     if last is None:
         return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=missed_ticks)

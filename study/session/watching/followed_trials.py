@@ -5,8 +5,8 @@ from protocols.procedure.schedule import Run
 from protocols.procedure.staircase import level_n
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.state.state import SessionState, current_rule, due
+from study.session.watching.followed_session import Watched
 from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeLine, StaircasePoint, WatchedRun
-from study.session.watching.watched import Watched
 
 LAST_TRIALS = 40
 

@@ -1,5 +1,5 @@
-"""Proof that the device's watchdog works: it is armed, the loop stops on purpose, and the device must switch its force
-off in time.
+"""Test of the device's watchdog at every opening: it is armed, the loop stops on purpose, and the device must switch
+its force off in time.
 
 The command is zero throughout, so nothing pulls whether or not it works; what counts is that the device says that it
 takes no forces any more, that its brakes hold, and that its watchdog is why.
@@ -11,7 +11,9 @@ from study.devices.force_dimension.handle import WATCHDOG_CAUSE, Handle, Status
 from study.errors import DeviceError
 
 ARMED_FOR_S = 0.05
+"""Time for which zero forces are sent before the silence."""
 EVERY_S = 0.002
+"""Interval of polling."""
 MARGIN_S = 0.02
 """Time granted beyond the watchdog's own, for the USB and the device's own bookkeeping."""
 
@@ -19,7 +21,7 @@ ATTEMPTS = 5
 """A busy computer may come too late for the watchdog before it is meant to."""
 
 
-def prove_watchdog(
+def check_watchdog(
     handle: Handle, drops_after_s: float, now_s: Callable[[], float], sleep: Callable[[float], None]
 ) -> float:
     """After how many seconds of silence the device was found without force; the device takes forces again after.
@@ -27,13 +29,13 @@ def prove_watchdog(
     Raises `DeviceError` where it holds on, and `LibraryError`.
     """
     if drops_after_s <= 0:
-        raise _proof_error("It has no watchdog, or none that can be set.")
+        raise _watchdog_error("It has no watchdog, or none that can be set.")
     if not any(_send_zeros(handle, now_s, sleep) for _ in range(ATTEMPTS)):
-        raise _proof_error(f"It does not keep taking forces: {handle.status().why_off}.")
+        raise _watchdog_error(f"It does not keep taking forces: {handle.status().why_off}.")
     silent_since_s = now_s()
     while (status := handle.status()).force_on:
         if now_s() - silent_since_s > drops_after_s + MARGIN_S and handle.status().force_on:
-            raise _proof_error(
+            raise _watchdog_error(
                 f"{1000 * (now_s() - silent_since_s):.0f} ms after the last command it still takes forces."
             )
         sleep(EVERY_S)
@@ -56,14 +58,14 @@ def _send_zeros(handle: Handle, now_s: Callable[[], float], sleep: Callable[[flo
 
 def _check_reason(status: Status) -> None:
     if status.off_cause != WATCHDOG_CAUSE:
-        raise _proof_error(f"It let go for another reason: {status.why_off}.")
+        raise _watchdog_error(f"It let go for another reason: {status.why_off}.")
     if not status.braking:
-        raise _proof_error("It let go without its brakes.")
+        raise _watchdog_error("It let go without its brakes.")
 
 
-def _proof_error(happened: str) -> DeviceError:
+def _watchdog_error(happened: str) -> DeviceError:
     return DeviceError(
-        "The device's watchdog is not proved",
+        "The device's watchdog failed its test",
         f"{happened} If this program died, the device would hold its last force.",
         "Do not let a person hold the handle. Switch the device off and on and try again; else update its firmware.",
     )

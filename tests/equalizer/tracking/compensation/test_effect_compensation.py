@@ -13,9 +13,9 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, ModelEffect, SensorLimits
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
+from equalizer.tracking.compensation.effect_compensation import compensate
 from equalizer.tracking.compensation.effect_roles import IN_MODEL, SENSORS
 from equalizer.tracking.compensation.known_forces import LAWS, deadband_share, equivalent_impedance
-from equalizer.tracking.compensation.known_physics import compensate
 from equalizer.tracking.compensation.without_effects import subtract_effects
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.planned_motion import planned_motion

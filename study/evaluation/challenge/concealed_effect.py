@@ -51,7 +51,7 @@ class EffectContext:
 
 
 @dataclass(frozen=True, slots=True)
-class HiddenEffect:
+class ConcealedEffect:
     """One effect that can be concealed."""
 
     name: str

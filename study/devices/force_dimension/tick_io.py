@@ -1,7 +1,8 @@
-"""Both halves of a tick, compiled: reading and force.
+"""Input and output of a tick, compiled: the reading of the sensors, and the writing of the force.
 
-They are the law for every caller: the loop calls them without the interpreter, the rig's own methods call them from
-Python. An answer of 0 is fine; any other is one of the codes below, `FAILED` keeps the first, and no force follows it.
+The only implementation for every caller: the loop calls it without the interpreter, the rig's own methods call it from
+Python. A return value of 0 is success; any other is one of the codes below, `FAILED` keeps the first, and no force
+follows it.
 """
 
 import math
@@ -52,7 +53,7 @@ from study.devices.native import Addresses, acquire, call_int, now_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
 
 LOOK_EVERY = 10
-"""Readings: how often status and buttons are asked for. 100 times a second: a person cannot press faster."""
+"""Ticks between two readings of status and buttons (100 Hz at 1 kHz: a person cannot press faster)."""
 
 STALE_FOR, STALE_SHARE = 50, 0.5
 """Readings that only repeat an earlier one: so many in a row, or as many beyond this share of all readings, end the
@@ -63,8 +64,9 @@ SCALED_FOR, SCALED_SHARE = 5, 0.02
 A force whose peaks alone are scaled is so only for some milliseconds in a row, again and again."""
 
 ROUNDING = 1 + 1e-9
+"""Factor on the cap that rounding may need."""
 LOCK_S = 0.002
-"""A write lasts a tenth of that: what waits longer waits for a call that hangs."""
+"""Longest wait for the lock (s). A write lasts a tenth of it: a longer wait is for a call that hangs."""
 
 
 @part
