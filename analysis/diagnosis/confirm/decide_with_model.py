@@ -1,9 +1,10 @@
-"""Decides by held-out gain what a search with a given model names, where residuals exceed the noise.
+"""Decides by the error on held-out samples which effects a search with a given model names.
 
-Where repeats show that the noise is about as large as the residual, the likelihood decides (`verdict`). Otherwise the
-residual of a real device is far above its noise, and remains so even with a true law. An effect is then confirmed by
-its share of the held-out error power: compared with the re-tuned model, with its best rival, and with the gain of all
-laws together.
+Used where residuals exceed the noise. Where repeats show that the noise is about as large as the residual, the
+likelihood decides (`verdict`). Otherwise the residual of a real device is far above its noise, and remains so even with
+a true law. An effect is then named if it removes enough of the held-out error power, with a 95 % interval by block
+bootstrap (`held_out_gain`): compared with the re-tuned model, with its best rival, and with the gain of all laws
+together. `objection` lists these conditions in their order.
 """
 
 from collections.abc import Sequence
@@ -45,15 +46,15 @@ class ResultWithModel:
 def decide_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, result: SearchResult, time_left: TimeBudget
 ) -> ResultWithModel:
-    """The result by held-out gain, and the balances beside the model. seen: the result of the search by simulation."""
+    """The result after the decision, and the balances beside the model. result: of the search by simulation."""
     if result.judgement.verdict not in ("unexplained", "partly_explained") or result.found.statistic is not None:
         return ResultWithModel(result)
     known_noise = all(floor.how == "repeats" for floor in fitting.chosen.floors)
     balances = find_balances_beside_model(recordings, fitting.model, result.context.barred, time_left)
-    near = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
+    near_noise = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
     if result.judgement.named or result.found.barred:
         return ResultWithModel(result, balances)
-    if known_noise and near:
+    if known_noise and near_noise:
         why_not = "the noise is known here, and what it leaves is more than noise"
         return ResultWithModel(
             replace(result, unconfirmed=(*result.unconfirmed, *_unconfirmed_candidates(result, why_not))), balances
@@ -91,13 +92,13 @@ def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
         return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"
     claims = found.after.fitted.hypothesis.claims
     if whole.gain < NAMED_OF_CEILING and not all(_is_named_by_balance(claim, balances) for claim in claims):
-        return "it takes less than half of the error's power, and the force balance does not bear it out"
+        return "it takes less than half of the error's power, and the force balance does not confirm it"
     return ""
 
 
 def _not_better(context: SearchContext, rival: FittedCandidate, after: FittedCandidate) -> bool:
-    ahead = held_out_gain(context.whole, rival, after)
-    return ahead is None or ahead.low <= 0
+    gain_over_rival = held_out_gain(context.whole, rival, after)
+    return gain_over_rival is None or gain_over_rival.low <= 0
 
 
 def _best_rival(context: SearchContext, result: SearchResult) -> FittedCandidate | None:

@@ -25,6 +25,7 @@ class ColouredMeasure:
     noise: FloatArray
     """(c,): rms of the whitened residual of the reference recordings, in each channel's own unit."""
     least: float = 0.0
+    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
 
     @property
     def name(self) -> str:

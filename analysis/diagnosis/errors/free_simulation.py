@@ -31,14 +31,16 @@ class FreeSimulation:
 
     records: tuple[Observed, ...]
     unit: FloatArray
+    """(c,): unit of the residuals: the rms noise, with the floor of `with_floor` added."""
     noise: FloatArray
     """(c,): rms noise."""
     name: str = "free simulation"
     known: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
+    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
     coarser: int = 1
-    """Factor on the length of steps under motion-dependent forces."""
+    """Factor on the length of time steps under motion-dependent forces."""
     pieces: tuple[Restarts, ...] = ()
     """Per record, where its parts were joined, and the states in which these begin; empty where records are whole."""
 
@@ -56,7 +58,7 @@ class FreeSimulation:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
+        with np.errstate(over="ignore", invalid="ignore"):  # a simulation may diverge
             return tuple(
                 _subtract_prediction(record.measured, self._simulate(model, effects, record, simulate_response, joined))
                 / self.unit
@@ -95,13 +97,14 @@ class FreeSimulation:
     ) -> tuple[Evidence, ...]:
         found = []
         for record, left in zip(self.records, residuals, strict=True):
-            played = self._simulate(model, effects, record, simulate_mechanism)
-            there = add_carried_weight(model, record.recording)
-            found.append(evidence_of(there, record, played, left, (self.unit, self.noise)))
+            simulated = self._simulate(model, effects, record, simulate_mechanism)
+            loaded = add_carried_weight(model, record.recording)
+            found.append(evidence_of(loaded, record, simulated, left, (self.unit, self.noise)))
         return tuple(found)
 
 
 def _coarsen(placed: PlacedEffect, times: int) -> PlacedEffect:
+    """The effect with `times` times longer time steps."""
     acts = placed.effect.acts
     if times == 1 or not isinstance(acts, (AxisForce, JointForce)):
         return placed
@@ -109,14 +112,14 @@ def _coarsen(placed: PlacedEffect, times: int) -> PlacedEffect:
     return replace(placed, effect=replace(placed.effect, acts=longer))
 
 
-def _subtract_prediction(measured: FloatArray, played: SimulationResult) -> FloatArray:
+def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> FloatArray:
     """The residual: measured less simulated signals."""
-    p, rest = played.response.shape[1], measured.copy()
-    rest[:, :p] -= played.response
-    rest[:, p:] -= played.position[:, : rest.shape[1] - p]
+    p, rest = simulated.response.shape[1], measured.copy()
+    rest[:, :p] -= simulated.response
+    rest[:, p:] -= simulated.position[:, : rest.shape[1] - p]
     return rest
 
 
-def predicted_channels(played: SimulationResult, count: int) -> FloatArray:
+def predicted_channels(simulated: SimulationResult, count: int) -> FloatArray:
     """(n, count): the response and, where `count` includes it, the position."""
-    return np.hstack([played.response, played.position])[:, :count]
+    return np.hstack([simulated.response, simulated.position])[:, :count]

@@ -30,7 +30,7 @@ _UNSEEN = 1e-9
 
 
 WINDOW_S = 1.0
-"""Shortest window."""
+"""Shortest window (s)."""
 STATES = 10.0
 """Least readings of a window per state: the fitted initial state then absorbs a tenth of an error at most by chance."""
 
@@ -49,6 +49,7 @@ class Windows:
     known: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
+    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
 
     @property
     def name(self) -> str:
@@ -93,7 +94,7 @@ class Windows:
         model = add_carried_weight(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         length = samples_of(self.window_s, recording.sample_rate_hz)
-        played = simulate_windows(
+        simulated = simulate_windows(
             model,
             record.command,
             (recording.sample_rate_hz, recording.hold),
@@ -102,11 +103,11 @@ class Windows:
             Restarts(length * np.arange(len(states)), states),
         )
         with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-            left = (record.measured - predicted_channels(played, record.measured.shape[1])) / self.unit
+            left = (record.measured - predicted_channels(simulated, record.measured.shape[1])) / self.unit
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
-        return played, self._without_states(structure, left, recording.sample_rate_hz, length)
+        return simulated, self._without_states(structure, left, recording.sample_rate_hz, length)
 
     def _without_states(
         self, structure: MechanicalModel, left: FloatArray, sample_rate_hz: float, length: int
@@ -134,12 +135,12 @@ class Windows:
     def _evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> Evidence:
-        played, left = self._simulate_from_states(model, effects, record, states)
+        simulated, left = self._simulate_from_states(model, effects, record, states)
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
         entered = actuator_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
-        found = smooth_motion(model, record, entered + played.axis_force, self.unit)
-        measured, predicted = without_gaps(record.measured, left * self.unit, played)
+        found = smooth_motion(model, record, entered + simulated.axis_force, self.unit)
+        measured, predicted = without_gaps(record.measured, left * self.unit, simulated)
         has_position = measured.shape[1] > p
         return Evidence(
             model=model,

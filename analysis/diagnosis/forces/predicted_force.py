@@ -41,6 +41,7 @@ class PredictedForce:
     known: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
+    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
     remembered: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
     """Last inputs and result by kind and record: laws are compared on one model, models on one command."""
 

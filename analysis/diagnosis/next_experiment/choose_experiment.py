@@ -197,8 +197,8 @@ def _simulate(
     model: MechanicalModel = bench.tuning.tune(deviations)
     model = add_mass(model, experiment.added) if experiment.added else model
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-        played = simulate_mechanism(
+        simulated = simulate_mechanism(
             model, experiment.commands, bench.sample_rate_hz, hypothesis.placed_effects(point), bench.hold
         )
-        signals = np.hstack([played.response, played.position])[:, : len(bench.noise)]
+        signals = np.hstack([simulated.response, simulated.position])[:, : len(bench.noise)]
         return np.asarray((signals / bench.noise).ravel())

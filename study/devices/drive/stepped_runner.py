@@ -15,7 +15,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import Fault
-from study.devices.drive.compiled_drive import COURSE_SIZE, DECIDING, GONE, OVER, STAMPS, WRITING
+from study.devices.drive.compiled_drive import DECIDING, GONE, LOOP_STATE_SIZE, OVER, STAMPS, WRITING
 from study.devices.drive.compiled_ticks import CompiledTicks, halves_of
 from study.devices.drive.last_reading import LastReading
 from study.devices.governor import cells, govern
@@ -78,17 +78,17 @@ class SteppedRunner:
         self.failure: BaseException | None = None
         self.force_off = self.disconnected = True
         self._seen: LastReading | None = None
-        self.course: FloatArray = np.zeros(COURSE_SIZE)
+        self.loop_state: FloatArray = np.zeros(LOOP_STATE_SIZE)
         halves = halves_of(rig) if now_s is None or monotonic else None
-        self._compiled = CompiledTicks(halves, governor, self.course) if halves is not None else None
-        self.course[STAMPS] = now_s is not None
+        self._compiled = CompiledTicks(halves, governor, self.loop_state) if halves is not None else None
+        self.loop_state[STAMPS] = now_s is not None
         self._closed = self._ended = False
         self._zero = Standby(lambda: rig.write(np.zeros(3)), "force off")
         self._disconnect = Standby(rig.close, "disconnect")
 
     @property
     def moving(self) -> bool:
-        return self._governor.moving or bool(self.course[DECIDING])
+        return self._governor.moving or bool(self.loop_state[DECIDING])
 
     @property
     def seen(self) -> LastReading | None:
@@ -107,7 +107,7 @@ class SteppedRunner:
 
     @property
     def _gone(self) -> bool:
-        return bool(self.course[GONE])
+        return bool(self.loop_state[GONE])
 
     def glance(self) -> None:
         if self._gone:
@@ -130,7 +130,7 @@ class SteppedRunner:
                     break
 
     def attend(self) -> int:
-        """Ticks in real time, in `course`, until something is WANTED: see `compiled_drive.attend`, and only where
+        """Ticks in real time, in `loop_state`, until something is WANTED: see `compiled_drive.attend`, and only where
         `attends`. Never raises for a failing rig."""
         assert self._compiled is not None
         code = OVER
@@ -165,20 +165,20 @@ class SteppedRunner:
 
     def give_up(self, failure: BaseException) -> None:
         self.failure = self.failure or failure
-        self.course[GONE] = 1.0
+        self.loop_state[GONE] = 1.0
         self._silence(Fault.LOST)
 
     def drop(self, fault: Fault) -> None:
         self._silence(fault)
 
     def cut(self) -> None:
-        self.course[GONE] = 1.0
+        self.loop_state[GONE] = 1.0
         self._silence(Fault.STOPPED)
 
     def disconnect(self) -> None:
         if self._ended:
             return
-        self.course[GONE] = 1.0
+        self.loop_state[GONE] = 1.0
         try:
             self._silence(Fault.LOST if self.moving else Fault.NONE)
         finally:
@@ -195,14 +195,14 @@ class SteppedRunner:
             return True
         if self._now_s is not None:
             governor.state[cells.STAMP_S] = self._now_s()
-        self.course[DECIDING] = 1.0
+        self.loop_state[DECIDING] = 1.0
         over = govern.tick(governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force)
-        self.course[WRITING] = 1.0
+        self.loop_state[WRITING] = 1.0
         try:
             self._rig.write(governor.force.copy())
         finally:
-            self.course[WRITING] = 0.0
-        self.course[DECIDING] = 0.0
+            self.loop_state[WRITING] = 0.0
+        self.loop_state[DECIDING] = 0.0
         govern.publish(governor.state, governor.settings, governor.ring, reading)
         if not over:
             self._seen = LastReading(reading, self._rig.buttons())
@@ -219,15 +219,15 @@ class SteppedRunner:
         written = False
         try:
             written = (
-                self._zero.run(ZERO_PATIENCE_S) and not self.course[WRITING]
+                self._zero.run(ZERO_PATIENCE_S) and not self.loop_state[WRITING]
             )  # what still hangs may come after the zero
         finally:
             self.force_off = written
             if not written:
-                self.course[GONE] = 1.0
+                self.loop_state[GONE] = 1.0
                 self.failure = self.failure or TimeoutError("it took no zero force")
             self._governor.abandon(fault if written else Fault.FORCE_LEFT)
-            self.course[DECIDING] = 0.0
+            self.loop_state[DECIDING] = 0.0
 
     def _once_more(self) -> None:
         """The caller gave up while this thread was in the driver: what it wrote is taken back."""

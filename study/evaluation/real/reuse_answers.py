@@ -1,4 +1,8 @@
-"""Reuse answers of an earlier run: kept if inputs and settings are unchanged, refused before any work otherwise."""
+"""Reuse of answers of an earlier run of `hapteq real`.
+
+An answer is reused if the hashes of its input files and its settings are unchanged; otherwise the whole run is refused
+before any work, with the changes.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +16,7 @@ from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.formats.real_answer_file import read_answer_and_origin
 
 ANSWER_NAME, INJECTED_NAME = "answer.json", "injected"
+"""File with the answer to a recording, and folder with the answers to injected faults."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +24,7 @@ class _EarlierAnswer:
     place: Path
     answer: RealAnswer
     changes: tuple[str, ...]
-    """What differs from when it was made."""
+    """Changes of its inputs and settings since then, as sentences."""
 
 
 def answer_place(out: Path, real_recording: RealRecording) -> Path:
@@ -36,11 +41,11 @@ def origin_of_answer(real_recording: RealRecording, seconds: float | None) -> Pr
 def reusable_answers(out: Path, wanted: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
     """Earlier answers by folder; nothing is written. Raises StudyError where one is damaged or was made from other
     inputs."""
-    there = [each for each in wanted if (answer_place(out, each) / ANSWER_NAME).is_file()]
-    kept = [_read_earlier_answer(answer_place(out, each), each, seconds) for each in there]
-    if outdated := [each for each in kept if each.changes]:
+    answered = [recording for recording in wanted if (answer_place(out, recording) / ANSWER_NAME).is_file()]
+    earlier = [_read_earlier_answer(answer_place(out, recording), recording, seconds) for recording in answered]
+    if outdated := [answer for answer in earlier if answer.changes]:
         raise _inputs_changed_error(out, outdated)
-    return {each.place: each.answer for each in kept}
+    return {answer.place: answer.answer for answer in earlier}
 
 
 def _read_earlier_answer(place: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
@@ -50,7 +55,7 @@ def _read_earlier_answer(place: Path, real_recording: RealRecording, seconds: fl
         raise StudyError(
             f"{real_recording.folder.name}/{real_recording.name}/{error.title}",
             error.happened,
-            f"Move {place} away to have it answered anew, or choose another --out.",
+            f"Move {place} away to diagnose it again, or choose another --out.",
             saved="Nothing was written.",
         ) from error
     now = origin_of_answer(real_recording, seconds)
@@ -68,7 +73,7 @@ def _file_changes(then: set[tuple[str, str]], now: set[tuple[str, str]]) -> Iter
     names_then, names_now = ({name for name, _ in files} for files in (then, now))
     for name in sorted({name for name, _ in then ^ now}):
         if name not in names_then:
-            yield f"{name} is not among what it says it was made from"
+            yield f"{name} is not among its recorded inputs"
         else:
             yield f"{name} has changed" if name in names_now else f"{name} is gone"
 
@@ -77,7 +82,7 @@ def _setting_changes(origin: Mapping[str, Any], seconds: float | None) -> Iterat
     settings = origin.get("settings")
     then = settings.get("seconds", "") if isinstance(settings, dict) else ""
     if not isinstance(then, int | float | None):
-        yield "it does not say its --seconds"
+        yield "its --seconds is not recorded"
     elif then != seconds:
         yield f"--seconds was {_seconds(then)}, and is {_seconds(seconds)}"
 
@@ -87,13 +92,13 @@ def _seconds(limit_s: float | None) -> str:
 
 
 def _inputs_changed_error(out: Path, outdated: Sequence[_EarlierAnswer]) -> StudyError:
-    texts = (f"{each.place.relative_to(out) / ANSWER_NAME}: {', '.join(each.changes)}." for each in outdated)
-    places = [str(each.place) for each in outdated]
+    texts = (f"{answer.place.relative_to(out) / ANSWER_NAME}: {', '.join(answer.changes)}." for answer in outdated)
+    places = [str(answer.place) for answer in outdated]
     if (injected := out / INJECTED_NAME).exists():
-        places.append(f"{injected}, which was made with them")
+        places.append(f"{injected}, which was computed from them")
     return StudyError(
-        "Answers that are there were made from something else",
+        "Inputs of existing answers have changed",
         " ".join(texts),
-        f"Choose another --out; or, to have them answered anew, move away {'; '.join(places)}.",
-        saved="The old answers are kept as they are, and nothing was written.",
+        f"Choose another --out; or, to diagnose them again, move away {'; '.join(places)}.",
+        saved="The existing answers are unchanged, and nothing was written.",
     )

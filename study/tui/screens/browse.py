@@ -47,7 +47,7 @@ class BrowseScreen(ModalScreen[None]):
         width: 90%; max-width: 100; height: 90%; border: round $primary; padding: 0 1; background: $surface;
     }
     BrowseScreen HapteqFiles { height: 1fr; background: $surface; }
-    BrowseScreen #said { height: 1; color: $foreground 65%; }
+    BrowseScreen #message { height: 1; color: $foreground 65%; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Back", key_display="Esc"),
@@ -63,7 +63,7 @@ class BrowseScreen(ModalScreen[None]):
             box.border_title = "Open a session or a diagnosis"
             yield Input(str(self._folder.absolute()), compact=True, id="path")
             yield HapteqFiles(self._folder.absolute(), id="tree")
-            yield Static("", id="said", markup=False)
+            yield Static("", id="message", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -100,4 +100,4 @@ class BrowseScreen(ModalScreen[None]):
         dismiss_screen(self, None)
 
     def _say(self, text: str) -> None:
-        self.query_one("#said", Static).update(text)
+        self.query_one("#message", Static).update(text)

@@ -50,7 +50,7 @@ class DiagnoseForm(ModalScreen[None]):
     DiagnoseForm .field { height: auto; }
     DiagnoseForm Label { width: 13; }
     DiagnoseForm Input { width: 1fr; }
-    DiagnoseForm #said { height: 2; margin-top: 1; color: $text-error; }
+    DiagnoseForm #message { height: 2; margin-top: 1; color: $text-error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f5", "begin", "Diagnose", priority=True),
@@ -70,7 +70,7 @@ class DiagnoseForm(ModalScreen[None]):
                     yield Label(title)
                     first = shlex.quote(self._source) if name == "sources" and self._source else ""
                     yield Input(first, placeholder=hint, compact=True, id=name)
-            yield Static("", id="said", markup=False)
+            yield Static("", id="message", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -110,5 +110,5 @@ class DiagnoseForm(ModalScreen[None]):
         return self.query_one(f"#{name}", Input).value.strip()
 
     def _say(self, text: str, field: str) -> None:
-        self.query_one("#said", Static).update(text)
+        self.query_one("#message", Static).update(text)
         self.query_one(f"#{field}", Input).focus()

@@ -40,7 +40,7 @@ class RestScreen(TranslatedScreen[float]):
         with Card(words["rest_title"]):
             yield LiteralText(words["rest_relax"], classes="strong")
             yield Digits()
-            yield LiteralText(id="said", classes="gap strong")
+            yield LiteralText(id="message", classes="gap strong")
             yield LiteralText(words.counted("runs_left", notice.runs_left), classes="gap")
             if notice.progress is not None:
                 yield LiteralText(progress_sentence(notice.progress, words))
@@ -62,7 +62,7 @@ class RestScreen(TranslatedScreen[float]):
     def _tick(self) -> None:
         left_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))
         self.query_one(Digits).update(f"{left_s // 60}:{left_s % 60:02d}")
-        self.query_one("#said", LiteralText).update(self.words["rest_ready" if self._over() else "rest_resting"])
+        self.query_one("#message", LiteralText).update(self.words["rest_ready" if self._over() else "rest_resting"])
         if self._over():
             self._ticking.stop()
             self.refresh_bindings()

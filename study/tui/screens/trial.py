@@ -44,7 +44,7 @@ class TrialScreen(TranslatedScreen[None]):
     TrialScreen { layout: vertical; }
     TrialScreen #asked { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
     TrialScreen #answers { height: 1fr; margin: 0 1; }
-    TrialScreen #said { height: 1; margin: 0 1; text-align: center; text-style: bold; }
+    TrialScreen #message { height: 1; margin: 0 1; text-align: center; text-style: bold; }
     TrialScreen #trouble { height: 2; margin: 0 1; text-align: center; color: $text-warning; }
     """
     AUTO_FOCUS = ""
@@ -83,7 +83,7 @@ class TrialScreen(TranslatedScreen[None]):
         with Horizontal(id="answers"):
             yield DirectionPanel(1, words=self.words)
             yield DirectionPanel(2, words=self.words)
-        yield LiteralText(id="said")
+        yield LiteralText(id="message")
         yield LiteralText(id="trouble")
         yield Footer(show_command_palette=False)
 
@@ -223,7 +223,7 @@ class TrialScreen(TranslatedScreen[None]):
     @property
     def _composed(self) -> bool:
         """Whether it has been drawn; it may be armed before its first frame."""
-        return bool(self.query("#said"))
+        return bool(self.query("#message"))
 
     def _mark(self, mark: Mark) -> None:
         for panel in self.query(DirectionPanel):
@@ -234,4 +234,4 @@ class TrialScreen(TranslatedScreen[None]):
 
     def _say(self, sentence: str) -> None:
         if self._composed:
-            self.query_one("#said", LiteralText).update(sentence)
+            self.query_one("#message", LiteralText).update(sentence)

@@ -1,9 +1,9 @@
-"""The inverse of a model, learned of a few lines, against each line solved for by itself."""
+"""The inverse response fitted to a few lines, against the system solved at each line."""
 
 import numpy as np
 import pytest
 
-from analysis.diagnosis.forces import inverse_response as learning
+from analysis.diagnosis.forces import inverse_response as module
 from analysis.diagnosis.forces.inverse_response import fast_inverse_response, inverse_response
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -34,7 +34,7 @@ def test_all_lines_follow_from_a_few(coupling):
     assert not np.array_equal(found, wanted)
 
 
-def test_where_few_lines_do_not_foretell_the_others_all_are_solved_for(monkeypatch):
-    monkeypatch.setattr(learning, "zeros_of", lambda model, largest: np.array([-3.0 + 40.0j]))
+def test_where_few_lines_do_not_determine_the_others_all_are_solved_for(monkeypatch):
+    monkeypatch.setattr(module, "zeros_of", lambda model, largest: np.array([-3.0 + 40.0j]))
     found = fast_inverse_response(device(8.0), len(LINES), RATE_HZ / 2)(LINES)
     assert np.array_equal(found, inverse_response(device(8.0), LINES))

@@ -179,7 +179,7 @@ def played(rigs, monkeypatch):
         assert drive.start(lambda: governor.begin_hold(rigs.sine(2.0, fade_s=0.01)))
         governor.settings[cells.WATCHDOG_TICKS] = governor.state[cells.LONGEST] = np.inf
         clock.at_end = governor.ask_stop
-        drive._course[WANTED] = 0.0
+        drive._loop_state[WANTED] = 0.0
         calls = 0
         while governor.moving:
             calls += 1
@@ -187,7 +187,7 @@ def played(rigs, monkeypatch):
                 drive._wait_for_tick()
                 drive.pump(clock.now_s())
         assert (calls < 3) == compiled  # all of it in a call, or a tick each
-        arrays = (governor.state, governor.buffer, governor.ring, governor.force, drive._course[STARTED_S:DUE_S])
+        arrays = (governor.state, governor.buffer, governor.ring, governor.force, drive._loop_state[STARTED_S:DUE_S])
         return *(each.tobytes() for each in arrays), governor.health(), repr(runner.failure), clock.time_s
 
     yield play

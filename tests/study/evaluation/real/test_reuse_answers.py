@@ -78,7 +78,7 @@ def test_an_old_answer_is_not_reused_after_a_change_of_any_file(answered: RealPl
     path = answered.folder / "axis" / name
     path.write_bytes(path.read_bytes() + b"\n")
     error = refusal(answered)
-    assert error.title == "Answers that are there were made from something else"
+    assert error.title == "Inputs of existing answers have changed"
     assert error.happened == f"axis/run/answer.json: {name} has changed."
     assert f"move away {answered.out / 'axis' / 'run'}." in error.do_now
     assert "kept as they are" in error.saved
@@ -90,7 +90,7 @@ def test_a_file_that_came_or_went_is_reported(answered: RealPlan) -> None:
     (axis / "later.npz").rename(axis / "third.npz")
     said = refusal(answered).happened
     assert "later.npz is gone" in said
-    assert "third.npz is not among what it says it was made from" in said
+    assert "third.npz is not among its recorded inputs" in said
 
 
 def test_other_seconds_are_reported(answered: RealPlan) -> None:
@@ -111,7 +111,7 @@ def test_a_patience_that_counts_is_asked_as_often_everywhere() -> None:
 def test_faults_that_were_injected_into_it_go_with_it(answered: RealPlan) -> None:
     (answered.out / "injected").mkdir()
     error = refusal(RealPlan(answered.folder, answered.out, seconds=180.0))
-    assert f"{answered.out / 'injected'}, which was made with them" in error.do_now
+    assert f"{answered.out / 'injected'}, which was computed from them" in error.do_now
 
 
 @pytest.mark.parametrize("origin", [None, "hand-made", {"parents": 3, "settings": 4}, {"parents": ["a"]}])
@@ -119,8 +119,8 @@ def test_an_answer_that_does_not_say_what_it_was_made_from_is_not_taken(answered
     document = json.loads(kept(answered).read_text())
     kept(answered).write_text(json.dumps({**document, "provenance": origin}))
     said = refusal(answered).happened
-    assert "run.npz is not among what it says it was made from" in said
-    assert "it does not say its --seconds" in said
+    assert "run.npz is not among its recorded inputs" in said
+    assert "its --seconds is not recorded" in said
 
 
 @pytest.mark.parametrize("torn", ["", "{", '{"format": "hapteq-real-answer", "version": 1}'])

@@ -33,7 +33,7 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ModelsForPlaying:
+class PlaybackModels:
     """Identified models read from files and combined for a place in the workspace."""
 
     given: tuple[IdentifiedModel, ...]
@@ -73,7 +73,7 @@ class ModelsForPlaying:
         return self.at.models[int(np.argmax(self.at.weights))]
 
 
-def models_for_playing(paths: tuple[Path, ...], at_m: Vector | None, weight: float) -> ModelsForPlaying:
+def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: float) -> PlaybackModels:
     """Read and combine the models. Raises StudyError for files that are not models, cannot play a table, or do not
     go together."""
     if at_m is not None and not all(map(math.isfinite, at_m)):
@@ -95,12 +95,12 @@ def models_for_playing(paths: tuple[Path, ...], at_m: Vector | None, weight: flo
         raise _unfit(f"{_sentence(str(problem))} Models are {numbered}.", "Give models that go together.") from problem
 
 
-def _one(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> ModelsForPlaying:
+def _one(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> PlaybackModels:
     at = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
-    return ModelsForPlaying((model,), at, None, None, _far(paths[0], model, at_m), (), _sha256(paths))
+    return PlaybackModels((model,), at, None, None, _far(paths[0], model, at_m), (), _sha256(paths))
 
 
-def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None) -> ModelsForPlaying:
+def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None) -> PlaybackModels:
     if len(models) > 2:
         raise _unfit(
             f"{len(models)} models are of one place.", "Give one of them, or a narrow and a wide one for bands."
@@ -119,12 +119,12 @@ def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_
             "--band 5 400 --order 40.",
         ) from problem
     at = ModelsAtPlace(at_m or narrow.place_m or (0.0, 0.0, 0.0), (narrow,), (1.0,))
-    return ModelsForPlaying(models, at, two, None, _far(paths[0], narrow, at_m), (), _sha256(paths))
+    return PlaybackModels(models, at, two, None, _far(paths[0], narrow, at_m), (), _sha256(paths))
 
 
 def _several_places(
     paths: tuple[Path, ...], workspace: WorkspaceModels, at_m: Vector | None, weight: float
-) -> ModelsForPlaying:
+) -> PlaybackModels:
     if at_m is None:
         places = "; ".join(
             f"{path.name} {_mm(model.place_m)}" for path, model in zip(paths, workspace.models, strict=True)
@@ -145,7 +145,7 @@ def _several_places(
     if not choice.checks:
         remarks.append("No place could be held out: what the error is between the models' places is not known.")
     held_out = tuple(_held_out(check) for check in choice.checks)
-    return ModelsForPlaying(workspace.models, at, None, choice, tuple(remarks), held_out, _sha256(paths, at_m))
+    return PlaybackModels(workspace.models, at, None, choice, tuple(remarks), held_out, _sha256(paths, at_m))
 
 
 def _held_out(check: PlaceCheck) -> str:
