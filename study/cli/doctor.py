@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from study.workflows.checks.examine_setup import Examination
 
 NAME_WIDTH = 17
+"""Columns of a finding's name."""
 CALIBRATION_S = 60.0
+"""Longest wait for a calibration by hand (s)."""
 
 
 TimingOption = Annotated[

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from study.session.views.archive_views import DiagnosisView, SessionView, Staircase
 
 PLOT_COLUMNS, PLOT_ROWS = 78, 12
+"""Size of a staircase's picture, in characters."""
 
 
 def show(

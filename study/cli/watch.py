@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 LOG_NAME = "events.jsonl"
 """As `study.store.sessions.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
 PLAIN_EVERY_S = 0.2
+"""Interval between two views in plain lines (s)."""
 
 
 def watch(

@@ -38,6 +38,7 @@ HIGHEST_PLAUSIBLE = {
 """As in `protocols.definition.plausibility`; repeated here for settings that come from no protocol."""
 
 RATES_HZ = (100.0, 10_000.0)
+"""Accepted rates of a device's loop (Hz)."""
 
 HEAVIEST_KG = 10.0
 """The spring's stiffness rests on the mass that the device says: no handle on a desk weighs so much."""

@@ -26,6 +26,7 @@ TRUE_ACCELERATION = slice(6, 9)
 SENSOR_CLIPPED = 9
 """1 if a channel of the accelerometer was at its limit, else 0."""
 READING_SIZE = 10
+"""Numbers in a reading."""
 
 
 class Rig(Protocol):

@@ -31,6 +31,7 @@ BLOCK_S = 0.05
 """The longest stretch in real time during which Python is not asked."""
 
 VIRTUAL_BLOCK_S = 5.0
+"""Largest block of ticks that virtual time runs at once (s)."""
 
 NOT_CLOSED = (
     "the device did not answer when it was closed: it got zero force, and its brakes may be off; what was measured is "

@@ -25,6 +25,7 @@ from study.importing.part_signals import Key, PartSignals, part_signals
 from study.importing.time_base import NUMBERED_HZ, time_base, without_doubled_rows
 
 _NAMED = 3
+"""Parts that a message names."""
 
 
 class ImportNotes:

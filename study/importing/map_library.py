@@ -27,6 +27,7 @@ NO_DATA = (".toml", ".md")
 """File types beside data that are not data."""
 _NUMBER = re.compile(r"\d+")
 _SHOWN = 4
+"""Files that a message names."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.signal import FloatArray
 
 _SETTLING_S = 2.0
+"""Zero padding for the filter's transient (s)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

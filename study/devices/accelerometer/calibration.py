@@ -11,6 +11,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 GRAVITY_MPS2 = 9.80665
+"""Standard gravity (m/s^2)."""
 
 POSITIONS = ("+x up", "-x up", "+y up", "-y up", "+z up", "-z up")
 UP = np.kron(np.eye(3), np.array([[1.0], [-1.0]]))

@@ -57,6 +57,7 @@ ZERO_PATIENCE_S = 0.1
 """For a zero force to be written: a hundred times what a driver takes."""
 
 CLOSE_PATIENCE_S = 1.0
+"""Longest wait for the driver to close its device (s)."""
 
 
 class SteppedRunner:

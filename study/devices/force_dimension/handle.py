@@ -30,6 +30,7 @@ OFF_CAUSES = {
     UNCALIBRATED_CAUSE: "it does not know its place any more, and needs to be calibrated",
 }
 WATCHDOG_CAUSE = 3
+"""The library's code for forces that the device's watchdog switched off."""
 
 TRIES = 3
 """To stop a device whose connection fails."""

@@ -41,6 +41,7 @@ a force."""
 TOLD, SENT = 17, 20
 """First cells of the force that the device reports (x, y, z; N), and of the last `MEMORY` forces sent (x, y; N)."""
 MEMORY = 3
+"""Forces sent that are remembered, for the comparison with the reported force."""
 CELLS_SIZE = SENT + 2 * MEMORY
 
 OF_LIBRARY = 1

@@ -16,6 +16,7 @@ from study.devices.force_dimension.rig import ForceDimensionRig
 from study.devices.force_dimension.watchdog_check import check_watchdog
 
 RATE_HZ = 1000.0
+"""Rate of the loop (Hz)."""
 
 
 def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:

@@ -6,6 +6,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import part
 
 OVERFLOWING = 1e100
+"""Norm (N) above which squares of components may overflow; such a force becomes zero."""
 
 WITHIN, BEYOND = 1 - 1e-12, 1 + 1e-9
 """Forces are confined to the first share of a limit: rounding cannot then carry them over it. They count as limited

@@ -27,6 +27,7 @@ LOOK_EVERY_S = 0.2
 """Whether the caller's process is there still: a fork of it may hold its end of a pipe open."""
 
 LAST_ANSWER_S = 1.0
+"""Longest wait for the thread that sends the last answer (s)."""
 
 OPENING_GRACE_S = 1.0
 """While the device is opened, no force of a stimulus is on that a fade would end: the process ends soon."""

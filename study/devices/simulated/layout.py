@@ -6,6 +6,7 @@ MOUNTS = 2
 SUBSTEPS = 10
 """Steps of integration in a tick."""
 TICK_S = 1e-3
+"""Duration of a tick of the loop (s)."""
 STEP_S = TICK_S / SUBSTEPS
 
 # State, SI units.

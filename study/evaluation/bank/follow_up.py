@@ -32,6 +32,7 @@ NEXT = "next"
 FURTHER = "recording_{}.h5"
 PROPOSED, DRAWN = "proposed", "drawn"
 NOISE_SEED = 7
+"""Keeps the noise and the random order of follow-ups apart from all other draws of a case."""
 
 
 def follow_up(

@@ -15,10 +15,13 @@ LEVELS_N = (0.5, 1.5, 3.0)
 """Peaks of the multisines."""
 PERIOD, PERIODS, TEST_PERIODS = 2000, 4, 2
 REST = 500
+"""Samples of rest between two segments."""
 FIRST_LINE, LAST_LINE = 3, 479
 """Lines of a 2 s period: 1.5 to 239.5 Hz, odd lines only."""
 SWEEP_N, SWEEP_HZ, SWEEP_SAMPLES, SWEEP_FADE = 1.8, (1.0, 240.0), 6000, 200
+"""Swept sines of the test: peak, first and last frequency, samples, and samples of each fade."""
 SLOW_N, SLOW_HZ, SLOW_SAMPLES, SLOW_FADE = 1.6, (0.9, 1.3, 2.1), 4000, 500
+"""Slow sines of the test, for large motions: peak, frequency per axis, samples, and samples of each fade."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

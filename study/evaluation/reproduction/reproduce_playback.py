@@ -28,7 +28,9 @@ PEAK_OVER_CAP = 0.93
 PERIODS = 2
 """Periods played; the first lets the transient decay."""
 FADE_S = 0.5
+"""Fade at the start of the periodic forces (s)."""
 WAVE_SEED = 5
+"""Seed of the wanted wave, the same for all methods."""
 
 Driver = Callable[[Signal], FloatArray]
 """Maps one period of wanted accelerations (period, 3) to forces."""

@@ -9,6 +9,7 @@ from study.session.watching.followed_session import Watched
 from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeLine, StaircasePoint, WatchedRun
 
 LAST_TRIALS = 40
+"""Latest trials that the experimenter's view lists."""
 
 
 def shown_run(state: SessionState) -> int | None:

@@ -32,6 +32,7 @@ _SEGMENT_TYPE = np.dtype(
 )  # fmt: skip
 
 _PACK_ABOVE_BYTES = 2**18
+"""Arrays above this size are compressed; smaller ones are too small to gain by it."""
 
 
 def read_recording(path: Path) -> Recording:

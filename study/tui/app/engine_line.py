@@ -12,6 +12,7 @@ from study.tui.engine.from_engine import Failed, Finished, FromEngine
 from study.tui.engine.to_engine import Begin, Heartbeat, Resume, ToEngine
 
 HEARTBEAT_S = 0.1
+"""Interval of the application's sign of life to the engine (s)."""
 
 
 class EngineMessage(Message):

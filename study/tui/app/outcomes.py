@@ -5,6 +5,7 @@ from study.tui.engine.from_engine import Failed, Finished
 from study.tui.screens.outcome import Decision, Outcome
 
 UNHEARD_AFTER_S = 2.0
+"""Time without an answer of the engine to a stop (s) after which the panel says so."""
 
 
 def letting_go(words: Words) -> Outcome:

@@ -79,6 +79,7 @@ def forget_drawn_before(app: App[Any]) -> None:
 
 
 TROUBLE_FOR_S = 8.0
+"""Time for which a warning is shown (s)."""
 
 
 class SittingScreens:

@@ -9,7 +9,9 @@ from study.session.watching.watch_view import WatchView
 from study.tui.engine.child_process import start_child
 
 LOOK_EVERY_S = 0.2
+"""Interval at which the log is read (s)."""
 CLOSING_S = 2.0
+"""Longest wait for the child process to end (s)."""
 
 
 class WatchFeed:

@@ -13,6 +13,7 @@ from study.workflows.trial.display import SignOfLife
 GLANCE_S = 0.05
 """Interval of the signs of life: half of what the port allows."""
 LINE_WIDTH = 78
+"""Characters per line: two less than the narrowest usual terminal."""
 
 
 @dataclass(frozen=True, slots=True)

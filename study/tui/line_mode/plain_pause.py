@@ -10,6 +10,7 @@ from study.tui.trial_words import progress_sentence
 from study.workflows.trial.display import SignOfLife
 
 COUNT_EVERY_S = 10.0
+"""Interval at which the remaining time is printed (s)."""
 
 
 def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> float:

@@ -11,6 +11,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.translated_screen import TranslatedScreen
 
 TICK_S = 0.5
+"""Interval at which the elapsed time is drawn (s)."""
 SILENT = "…"
 
 

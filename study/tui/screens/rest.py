@@ -17,6 +17,7 @@ from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 TICK_S = 0.2
+"""Interval at which the remaining time is drawn (s)."""
 
 
 class RestScreen(TranslatedScreen[float]):

@@ -31,7 +31,9 @@ In a terminal: `hapteq doctor --calibrate-sensor PORT --keep`.
 """
 FIELDS = (("port", "Port", "/dev/ttyACM0"), ("baud", "Baud", "2000000"))
 BAUD = 2_000_000
+"""Default rate of the serial line."""
 STEPS = 6
+"""Positions of the calibration."""
 
 
 class SensorScreen(Screen[None]):

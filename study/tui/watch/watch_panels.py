@@ -40,6 +40,7 @@ _STANDING_STYLES = {
 _RUN_SYMBOLS: dict[RunStatus, str] = {"done": "✓", "present": "▶", "to come": " "}
 _VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error"}
 BAR_CELLS = 6
+"""Characters of a bar."""
 
 
 def standing_line(view: WatchView) -> Content:

@@ -84,7 +84,9 @@ LOOK_EVERY_S = 0.1
 UNHEARD_AFTER_S = 2.0
 """A session checks for requests twenty times a second."""
 NO_NEWS_AFTER_S = 3.0
+"""Time without a new view (s) after which the screen says that it is old."""
 SAID_FOR_S = 8.0
+"""Time for which a message stays (s)."""
 
 
 class WatchMessage(Message):

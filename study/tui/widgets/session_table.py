@@ -21,10 +21,12 @@ _FIXED = {_STANDING: 12, _RUNS: 5, _ANSWERS: 7}
 """Widths in cells, so that little has to be measured in a long list. The protocol gets the remaining width, and
 wraps."""
 _LEAST_PROTOCOL, _PADDING = 10, 2
+"""Characters: least width of the protocol's column, and padding of a cell."""
 
 AT_ONCE = 60
 """Rows added at once: more than any terminal shows."""
 _BREATH_S = 0.01
+"""Pause between two batches of rows (s), in which keys are handled."""
 
 
 class SessionTable(DataTable[Content | str]):

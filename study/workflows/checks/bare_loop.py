@@ -28,7 +28,9 @@ CHANCE = 3.0
 """Standard errors of the two counts, as of independent events, within which a difference counts as chance."""
 
 COMPILING_S = 120.0
+"""Longest compilation of the C loop (s)."""
 OVERTIME_S = 30.0
+"""Longest delay of the C loop's end beyond its duration (s)."""
 NAME = "Bare C loop"
 ADVICE = (
     "The computer can do better than this loop did: close other programs, measure again, and report it if it stays."

@@ -12,7 +12,9 @@ from study.session.stimulus.limits import forces_in_words
 from study.session.views.views import DeviceFinding, DeviceReport
 
 LOOKS = 50
+"""Readings taken."""
 EVERY_S = 0.01
+"""Interval between them (s)."""
 
 ENOUGH = 0.9
 """Fraction of the reads that must succeed: a busy computer is late now and then."""
@@ -24,6 +26,7 @@ NOISY_MPS2 = 1.0
 """An accelerometer at rest has about 0.1 m/s² (its noise over 500 Hz); a trembling hand on the handle, up to 0.5."""
 
 RATE_HZ = 1000.0
+"""Rate of the loop for which stimuli are made (Hz)."""
 
 MM_PER_M = 1000.0
 

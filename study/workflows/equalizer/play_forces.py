@@ -17,7 +17,9 @@ from study.workflows.equalizer.spring_not_in_model import spring_outside_model
 SPRING_HZ = 3.5
 """Spring of the shipped recordings, for a model that does not state its spring."""
 SPRING_ROOM_N = 1.5
+"""Force that the virtual spring may add to the cap (N)."""
 HAND_CAP_N = 3.0
+"""Largest cap with a hand on the handle (N), as in any protocol."""
 
 
 def require_device_alone(models: PlaybackModels) -> None:

@@ -23,6 +23,7 @@ from study.workflows.recording.play_pieces import Take, play_pieces
 from study.workflows.recording.take_facts import segment_facts, spring_facts, warnings_of
 
 NOMINAL_RATE_HZ = 1000.0
+"""Rate for which durations are stated before a device is open (Hz)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from study.session.views.local_time import Zone, local_time
 from study.workflows.results.fold_session import FoldedSession
 
 _HASH_DIGITS = 12
+"""Digits of the protocol's hash that are shown."""
 
 
 def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:

@@ -23,6 +23,7 @@ from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import DAMPING_SQUARE
 
 CREEP_TIMES_S = (0.02, 0.2, 2.0)
+"""Time constants of the creep (s), a decade apart."""
 
 
 def _draw_creep(at: EffectContext) -> dict[str, float]:

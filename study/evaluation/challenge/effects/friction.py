@@ -12,6 +12,7 @@ from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.friction_kernel import BEND, NEGATIVE, POSITIVE, SLOPE, SPEED, STATIC_RATIO, STIFFNESS
 
 STIFF_N_PER_M = 3e6
+"""Stiffness of the bristle where the effect has none of its own: far stiffer than any part of a bench."""
 
 
 def _with_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:

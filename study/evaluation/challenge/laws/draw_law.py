@@ -36,6 +36,7 @@ ONE_AXIS = 0.75
 LOUD_N = 4.5
 """Level (N) of a stretch kept for the test: 1.5 times the highest level used to find laws."""
 FRESH_N, FRESH_PERIOD, FRESH_PERIODS = 2.0, 2000, 2
+"""Test motion that no recording contains: peak of its multisine, samples per period, periods."""
 
 
 @dataclass(frozen=True, slots=True)

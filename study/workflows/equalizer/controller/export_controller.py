@@ -23,6 +23,7 @@ TITLE = "The controller was not exported"
 LONGEST_ROWS = 5000
 """Longest transient in rows: every row is 130 numbers for a model of order 26, and a compiler reads them all."""
 LONGEST_PREVIEW_S = 2.0
+"""Longest preview that is accepted (s)."""
 TRY = "Such as --preview 200 --cap 3."
 
 
