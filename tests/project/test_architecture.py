@@ -32,6 +32,13 @@ def test_every_path_in_a_page_exists(page):
     assert [path for path in paths if not (ROOT / path).exists()] == []
 
 
+def test_every_function_that_a_page_points_to_is_in_that_file():
+    text = (DOCS / "contributing.md").read_text("utf-8")
+    pointers = re.findall(r"`([a-z0-9_/]+\.py)`, function `(\w+)`", text)
+    assert len(pointers) > 3
+    assert [(path, name) for path, name in pointers if f"\ndef {name}(" not in (ROOT / path).read_text("utf-8")] == []
+
+
 @pytest.mark.parametrize("room", sorted(rooms()))
 def test_a_room_says_what_is_in_it(room):
     said = (ROOT / room / "__init__.py").read_text("utf-8")
