@@ -139,6 +139,8 @@ class Errors:
 
 @dataclass(frozen=True, config=STRICT)
 class Fit:
+    """Errors on the samples fitted to, and on held-out samples."""
+
     fit: Errors
     test: Errors
 
@@ -154,6 +156,8 @@ class NextExperiment:
 
 @dataclass(frozen=True, config=STRICT)
 class Diagnosis:
+    """The whole document."""
+
     verdict: Verdict
     mismatch: tuple[Mismatch, ...]
     effects: tuple[NamedEffect, ...]

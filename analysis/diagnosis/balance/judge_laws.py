@@ -93,6 +93,7 @@ class Balance:
 
 
 def judge_laws(search: StructureSearch) -> Balance:
+    """The simplest structure of a search with each law tested on held-out blocks, and named or not."""
     regression = search.regression
     if not blocks_to_judge(regression):
         alone = float(np.sqrt(search.linear.error / _signal_power(regression)))
@@ -139,6 +140,7 @@ def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
 
 
 def family_of(effect: str) -> set[str]:
+    """Effects of the same family, which act alike; the effect alone where it has none."""
     return next((family for family in FAMILIES if effect in family), {effect})
 
 

@@ -34,6 +34,8 @@ class Finding:
 
 @dataclass(frozen=True, config=STRICT)
 class FigureFindings:
+    """One published figure beside its reproduction."""
+
     figure: Annotated[int, Field(ge=1, le=5)]
     title: str
     source: Annotated[str, Field(description="Where in the paper.")]
@@ -76,6 +78,8 @@ class UsedModel:
 
 @dataclass(frozen=True, config=STRICT)
 class Reproduction:
+    """The whole document."""
+
     device: str
     subjects: int
     seed: int

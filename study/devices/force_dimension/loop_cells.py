@@ -62,6 +62,7 @@ def failed(cells: FloatArray, code: int) -> int:
 
 @part
 def of_library(cells: FloatArray, function: int) -> int:
+    """Record the failure of a function of the vendor's library. Returns its error code."""
     return failed(cells, OF_LIBRARY + function - SYSTEM_SIZE)
 
 
@@ -101,6 +102,7 @@ def check_on(calls: Addresses, cells: FloatArray) -> int:
 
 @part
 def note_sent(cells: FloatArray, x: float, y: float) -> None:
+    """Keep the horizontal part of a force that was sent, as the newest of `MEMORY`."""
     for place in range(SENT + 2 * MEMORY - 1, SENT + 1, -1):
         cells[place] = cells[place - 2]
     cells[SENT], cells[SENT + 1] = x, y
@@ -134,6 +136,7 @@ def _check_given(calls: Addresses, cells: FloatArray) -> int:
 
 @part
 def look(calls: Addresses, cells: FloatArray) -> int:
+    """Read buttons, status and the reported force. Returns 0 or an error code."""
     pressed = call_int(calls[BUTTONS], (np.int32(cells[NUMBER]),))
     if pressed == -1:  # no device has 32 buttons
         return of_library(cells, BUTTONS)

@@ -15,6 +15,7 @@ from the second share on: a stimulus that is just at its cap is not clipped."""
 
 @part
 def norm_of(x: float, y: float, z: float) -> float:
+    """Euclidean norm of a vector."""
     return math.sqrt(x * x + y * y + z * z)
 
 
@@ -26,6 +27,7 @@ def below(vector: FloatArray, bound: float) -> bool:
 
 @part
 def clear(force: FloatArray) -> None:
+    """Set a force to zero."""
     for i in range(3):
         force[i] = 0.0
 

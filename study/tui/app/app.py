@@ -35,6 +35,8 @@ from study.tui.watch.watching import Watching
 
 
 class HapteqApp(App[None]):
+    """The application of `hapteq study`: draws screens, reads keys, and lets the engine do all other work."""
+
     TITLE = "hapteq"
     # At the top: the keys and what to press next stand at the bottom.
     CSS = "ToastRack { align: right top; } Toast { max-width: 76; }"

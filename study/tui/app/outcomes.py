@@ -9,10 +9,12 @@ UNHEARD_AFTER_S = 2.0
 
 
 def letting_go(words: Words) -> Outcome:
+    """Panel after a stop was asked for: the engine was told."""
     return Outcome(words["stop_title"], (("", words["stop_told"]),), ("quit",), words=words)
 
 
 def unheard(words: Words) -> Outcome:
+    """Panel after the engine did not answer a stop in time."""
     told = words.fill("stop_unheard", {"seconds": f"{UNHEARD_AFTER_S:g}"})
     texts = (told, words["stop_safe"], words["stop_do_now"])
     return Outcome(words["stop_unheard_title"], tuple(("", text) for text in texts), ("quit",), words=words)

@@ -39,6 +39,8 @@ INTERRUPTED = StudyError(
 
 
 class Engine:
+    """Performs the screen's commands one after another until the screen is gone; signals interrupt the current one."""
+
     def __init__(self, connection: Connection) -> None:
         self._busy = False
         self._link = ScreenLink(connection, self._interrupt, _end_by_force)

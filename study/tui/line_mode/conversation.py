@@ -18,6 +18,8 @@ LINE_WIDTH = 78
 
 @dataclass(frozen=True, slots=True)
 class Line:
+    """A line that was typed."""
+
     text: str
     at_s: float
     """Clock time at which it arrived."""
@@ -37,6 +39,8 @@ class WaitOver(Enum):
 
 
 class Conversation:
+    """Dialogue with the participant in lines of text, in the words of the protocol's language."""
+
     def __init__(self, lines: LineInput, out: TextIO, clock: Clock, words: Words = ENGLISH_WORDS) -> None:
         self._lines = lines
         self._out = out

@@ -20,6 +20,7 @@ INPUT_ENDED = Unanswered(WaitOver.INPUT_ENDED.value, leave=True)
 
 
 def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> DemoChoice:
+    """Ask which direction of which vibration to play. Raises KeyboardInterrupt when the participant leaves."""
     talk.forget()
     vibration = menu.vibration
     talk.say("", _place(menu, vibration, talk.words))
@@ -57,6 +58,7 @@ def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOf
 
 
 def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
+    """Wait until the handle is at its place, saying how far it is. None once it is; otherwise why the wait ended."""
     talk.forget()
     last_sentence, said_at_s = "", float("-inf")
     while not (view := look()).ready:

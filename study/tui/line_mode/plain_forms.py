@@ -11,6 +11,7 @@ BACK = "b"
 
 
 def fill_in(form: Form, talk: Conversation) -> FormReply:
+    """Ask all fields of a form, one after another; `b` goes back by one."""
     talk.forget()
     words = talk.words
     talk.say("", form.title, *filter(None, (form.introduction, origin(form, words))))
@@ -48,6 +49,7 @@ def _confirm_changes(form: Form, answers: dict[str, str], talk: Conversation) ->
 
 
 def device_checked(report: DeviceReport, talk: Conversation) -> bool:
+    """Print the findings of the device check. True: go on; False: check again."""
     talk.forget()
     words = talk.words
     moves = f" {words['simulation']}" if report.simulated else ""

@@ -15,6 +15,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class AwaitReturnScreen(TranslatedScreen[None]):
+    """Waits for Enter after a void trial; nothing is played meanwhile."""
+
     PAGE = "help_void"
     DEFAULT_CSS = "AwaitReturnScreen { align: center middle; }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on", key_display="Enter")]

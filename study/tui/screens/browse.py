@@ -40,6 +40,8 @@ def _is_ours(path: Path) -> bool:
 
 
 class BrowseScreen(ModalScreen[None]):
+    """A tree of folders, in which a session or a diagnosis is picked."""
+
     HELP = HELP
     CSS = """
     BrowseScreen { align: center middle; }

@@ -20,6 +20,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class DemoScreen(TranslatedScreen[DemoChoice]):
+    """Plays either direction at each vibration on request; dismissed with the choice."""
+
     PAGE = "help_demo"
     DEFAULT_CSS = """
     DemoScreen #title { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }

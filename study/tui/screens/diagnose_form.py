@@ -41,6 +41,8 @@ FIELDS = (
 
 
 class DiagnoseForm(ModalScreen[None]):
+    """Asks for recordings and model of a diagnosis, and checks the paths."""
+
     HELP = HELP
     CSS = """
     DiagnoseForm { align: center middle; }

@@ -36,6 +36,8 @@ In a terminal: `hapteq show diagnosis.json`.
 
 
 class DiagnosisScreen(Screen[None]):
+    """A finished diagnosis on one page, in two columns where the terminal is wide."""
+
     HELP = HELP
     CSS = """
     DiagnosisScreen #head { height: 1; padding: 0 1; background: $primary-muted; }

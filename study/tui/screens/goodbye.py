@@ -16,6 +16,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class GoodbyeScreen(TranslatedScreen[None]):
+    """Thanks the participant and says what was saved."""
+
     PAGE = "help_goodbye"
     DEFAULT_CSS = "GoodbyeScreen { align: center middle; }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "close_page", "Close", key_display="Enter")]

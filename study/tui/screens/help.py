@@ -14,6 +14,8 @@ from study.tui.translated_screen import TranslatedScreen
 
 
 class HelpScreen(TranslatedScreen[None], ModalScreen[None]):
+    """Shows a page of help; Esc returns to the screen below."""
+
     CSS = """
     HelpScreen { align: center middle; }
     HelpScreen VerticalScroll {

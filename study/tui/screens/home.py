@@ -84,6 +84,8 @@ In a terminal: `hapteq study --subject P01`, `hapteq sessions`, `hapteq show SES
 
 
 class HomeScreen(Screen[None]):
+    """New-session form and list of past sessions; their actions are posted as messages."""
+
     HELP = HELP
     CSS = """
     HomeScreen #name { height: 1; padding: 0 1; background: $primary-muted; color: $foreground; }

@@ -19,6 +19,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class InstructionsScreen(TranslatedScreen[None]):
+    """Instructions before the first trial; dismissed when the participant begins."""
+
     PAGE = "help_instructions"
     DEFAULT_CSS = """
     InstructionsScreen { align: center top; }

@@ -38,6 +38,8 @@ KEYS: dict[Decision, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
+    """Content of the panel: a title, paragraphs, and the possible next steps."""
+
     title: str
     parts: tuple[tuple[str, str], ...]
     """(heading, text); a heading may be empty."""
@@ -50,6 +52,8 @@ class Outcome:
 
 
 class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
+    """The panel; dismissed with the next step that was chosen."""
+
     HELP = HELP
     CSS = """
     OutcomeScreen { align: center middle; }

@@ -15,6 +15,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class PracticeOverScreen(TranslatedScreen[None]):
+    """Shows the result of a practice until a key is pressed."""
+
     PAGE = "help_practice"
     DEFAULT_CSS = "PracticeOverScreen { align: center middle; }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on", key_display="Enter")]

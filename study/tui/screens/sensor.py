@@ -37,6 +37,8 @@ STEPS = 6
 
 
 class SensorScreen(Screen[None]):
+    """Guides through the six positions of the calibration; the engine reads the sensor."""
+
     HELP = HELP
     CSS = """
     SensorScreen { align: center middle; }

@@ -45,6 +45,8 @@ In a terminal: `hapteq show SESSION`, `hapteq resume SESSION`, `hapteq analyze S
 
 
 class SessionScreen(Screen[None]):
+    """One past session in tabs, with its actions: resume, analyse, withdraw, watch."""
+
     HELP = HELP
     CSS = """
     SessionScreen #head { height: 1; padding: 0 1; background: $primary-muted; }

@@ -98,6 +98,8 @@ class WatchMessage(Message):
 
 
 class WatchScreen(Screen[None]):
+    """The view, redrawn whenever a new one arrives, and the keys that send requests to the session."""
+
     HELP = HELP
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (126, "-wide")]  # noqa: RUF012 - as in the base class
     CSS = STYLE

@@ -14,6 +14,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class FormQuestion(Vertical):
+    """A question with its answer, or its choices."""
+
     DEFAULT_CSS = """
     FormQuestion {
         height: auto; margin-bottom: 1; padding: 0 1 0 2; background: $surface;

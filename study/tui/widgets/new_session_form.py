@@ -18,6 +18,8 @@ NOTHING_YET = [("…", "")]
 
 
 class NewSessionForm(Vertical):
+    """Fields of a new session; posts the request to begin once they are valid."""
+
     DEFAULT_CSS = """
     NewSessionForm { height: auto; border: round $primary; padding: 0 1; }
     NewSessionForm:focus-within { border: round $accent; }

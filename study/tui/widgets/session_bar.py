@@ -13,6 +13,8 @@ DONE, LEFT = "━", "─"
 
 
 class SessionBar(Widget):
+    """Run and trial on the left, progress on the right."""
+
     DEFAULT_CSS = """
     SessionBar { height: 1; padding: 0 1; background: $panel; color: $foreground; }
     """

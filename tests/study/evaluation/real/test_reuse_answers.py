@@ -81,7 +81,7 @@ def test_an_old_answer_is_not_reused_after_a_change_of_any_file(answered: RealPl
     assert error.title == "Inputs of existing answers have changed"
     assert error.happened == f"axis/run/answer.json: {name} has changed."
     assert f"move away {answered.out / 'axis' / 'run'}." in error.do_now
-    assert "kept as they are" in error.saved
+    assert "are unchanged" in error.saved
 
 
 def test_a_file_that_came_or_went_is_reported(answered: RealPlan) -> None:
