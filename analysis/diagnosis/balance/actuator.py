@@ -228,8 +228,10 @@ def _best_of_each(
     refined = [
         (error, replace(law, values=values)) for (_, law), (error, values) in zip(best.values(), moved, strict=True)
     ]
-    plain = min((error for error, law in refined if not law.rich), default=np.inf)
-    return [(error, law) for error, law in refined if not law.rich or error < (1 - COMMAND_RIVAL_LEAVES_MORE) * plain]
+    plain = min((error for error, law in refined if not law.flexible), default=np.inf)
+    return [
+        (error, law) for error, law in refined if not law.flexible or error < (1 - COMMAND_RIVAL_LEAVES_MORE) * plain
+    ]
 
 
 def _refined_values(

@@ -41,8 +41,10 @@ def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
     if effect in SLIDING and not _reverses(regression, judged.law.channel):
         return _doubted(judged, DEAD_BAND, BACKWARDS)
     if effect == "quadratic_damping":
-        rubs = any(each.law.effect in SLIDING and each.law.channel == judged.law.channel for each in balance.named)
-        if rubs and not _reverses(regression, judged.law.channel):
+        has_friction = any(
+            each.law.effect in SLIDING and each.law.channel == judged.law.channel for each in balance.named
+        )
+        if has_friction and not _reverses(regression, judged.law.channel):
             return _doubted(judged, "force_nonlinearity", BACKWARDS)
     if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
         return _doubted(judged, EQUIVALENT_LAWS[effect], "no inertia shows")

@@ -70,7 +70,7 @@ class Grams:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Blocks of one stream: those in which a fault is undone, and those without it."""
+    """Blocks of one compared: those in which a fault is undone, and those without it."""
 
     with_it: Grams
     at: tuple[int, ...]
@@ -97,7 +97,7 @@ class Fit:
 
     sizes: FloatArray
     errors: FloatArray
-    """(blocks with, then without): white sums of squares, over all streams."""
+    """(blocks with, then without): white sums of squares, over all compared_bases."""
 
     @property
     def error(self) -> float:

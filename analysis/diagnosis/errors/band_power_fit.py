@@ -151,9 +151,9 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
     columns[~np.isfinite(columns).all(axis=1)] = 0.0
     trust = np.minimum(1.0, TRUSTED / np.maximum(np.abs(off), TRUSTED))
     # Steps of the model's own numbers are small; where they leave a large residual, an effect is missing.
-    believed = columns * (trust**3 if t else trust)
-    pull = believed @ off
-    products = believed @ columns.T
+    weighted = columns * (trust**3 if t else trust)
+    pull = weighted @ off
+    products = weighted @ columns.T
     if t:
         pull[:t] -= at.deviations
         products[:t, :t] += np.eye(t)

@@ -1,4 +1,9 @@
-"""One base model on two sets of recordings, whitened and scaled so that both sets count alike."""
+"""One base model compared on two sets of recordings: reference (clean) and possibly faulty.
+
+A base predicts one signal from others by least squares. Its rows are whitened by the same filter (autoregression of the
+errors of both sets, Yule-Walker), so that sums of squares are log-likelihoods, and scaled to the error of each set, so
+that both count alike. A fault is tested by undoing it in the rows of one set (`rows_with_fault_undone`).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +33,7 @@ invalid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Side:
+class RecordingSet:
     """One set of recordings as rows of one base."""
 
     parts: tuple[Part, ...]
@@ -56,12 +61,13 @@ class Undone:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stream:
-    """One base on both sets."""
+class ComparedBase:
+    """One base on the clean and on the faulty set."""
 
     base: Base
-    clean: Side
-    other: Side
+    clean: RecordingSet
+    faulty: RecordingSet
+    """The recordings to diagnose."""
     whitening: FloatArray
     """Coefficients of the whitening filter of the errors."""
     columns: FloatArray
@@ -75,7 +81,7 @@ class Stream:
         base = self.base
         return 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / self.clean.parts[0].rate_hz
 
-    def grams(self, side: Side, changed: Sequence[Undone]) -> Grams:
+    def grams(self, side: RecordingSet, changed: Sequence[Undone]) -> Grams:
         """Products of a side's rows and of their changes by undone faults; see `Grams`."""
         moved = [_changed_columns(each.rows, side.rows) for each in changed]
         kept = np.hstack([side.white, *(self._changes(side, *each) for each in zip(changed, moved, strict=True))])
@@ -85,7 +91,7 @@ class Stream:
             len(self.columns),
         )
 
-    def _changes(self, side: Side, undone: Undone, at: Places) -> FloatArray:
+    def _changes(self, side: RecordingSet, undone: Undone, at: Places) -> FloatArray:
         """(valid samples, k): the changes of the columns `at`, whitened."""
         differences = [part[:, at] - plain[:, at] for part, plain in zip(undone.rows, side.rows, strict=True)]
         found = _whiten(self.whitening, differences, side.masks) / (self.columns[at] * side.scale)
@@ -111,13 +117,14 @@ def _changed_columns(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) ->
     return np.flatnonzero(largest.max(axis=0) > 0.0)
 
 
-def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Stream:
-    """Raises ValueError where too few rows of a set are left, numpy.linalg.LinAlgError where no base can be fitted."""
+def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> ComparedBase:
+    """The base fitted to both sets, whitened and scaled. Raises ValueError where too few rows of a set are left,
+    numpy.linalg.LinAlgError where no base can be fitted."""
     if isinstance(base, AutoregressiveBase):
         least = (base.order + 2 * REACH) * base.step
-        clean, other = ([part for part in side if len(part.known) > least] for side in (clean, other))
-    rows = base.rows(clean), base.rows(other)
-    valid = tuple(base.valid_samples(parts) for parts in (clean, other))
+        clean, faulty = ([part for part in parts if len(part.known) > least] for parts in (clean, faulty))
+    rows = base.rows(clean), base.rows(faulty)
+    valid = tuple(base.valid_samples(parts) for parts in (clean, faulty))
     gap_reach = min(_reach_of_gaps(side) for side in valid)
     masks = tuple(tuple(_settled(mask, gap_reach) for mask in side) for side in valid)
     fewest = max(FEWEST_ROWS, 2 * rows[0][0].shape[1])
@@ -129,11 +136,11 @@ def stream_of(base: Base, clean: Sequence[Part], other: Sequence[Part]) -> Strea
     residuals = [_residuals(rows[side], masks[side], columns) for side in (0, 1)]
     whitening = _whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
     sides = []
-    for parts, own, kept in zip((clean, other), rows, masks, strict=True):
+    for parts, own, kept in zip((clean, faulty), rows, masks, strict=True):
         white = _whiten(whitening, own, kept) / columns
         scale = _white_error(white)
-        sides.append(Side(tuple(parts), own, kept, scale, white / scale))
-    return Stream(base, sides[0], sides[1], whitening, columns, gap_reach)
+        sides.append(RecordingSet(tuple(parts), own, kept, scale, white / scale))
+    return ComparedBase(base, sides[0], sides[1], whitening, columns, gap_reach)
 
 
 def _settled(valid: Mask, gap_reach: int) -> Mask:
@@ -183,13 +190,14 @@ def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> Fl
     return np.asarray(np.concatenate([[1.0], -np.asarray(solve_toeplitz(power[:-1], power[1:]))]))
 
 
-def rows_with_fault_undone(stream: Stream, side: Side, fault: Fault, variant: Variant) -> list[Undone]:
+def rows_with_fault_undone(compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant) -> list[Undone]:
     """Rows with a fault of size 1 undone, one set of rows per size of the variant."""
     found = []
     # Undoing a fault of the predicted signal scales the errors: then the Jacobian of the undoing counts.
-    is_predicted = fault.place == (made := _source_of(stream.base))[0] and fault.site in (made[1], EVERY)
-    if is_predicted and variant.column_change is not None and isinstance(stream.base, ForceBase):
-        rate_hz = stream.base.rate_hz
+    place, site = _source_of(compared.base)
+    is_predicted = fault.place == place and fault.site in (site, EVERY)
+    if is_predicted and variant.column_change is not None and isinstance(compared.base, ForceBase):
+        rate_hz = compared.base.rate_hz
         changed = (
             variant.column_change(rows[:, 1:], rate_hz, part) for rows, part in zip(side.rows, side.parts, strict=True)
         )
@@ -197,35 +205,35 @@ def rows_with_fault_undone(stream: Stream, side: Side, fault: Fault, variant: Va
     for undo in variant.undo:
         undone = tuple(undo(part) for part in side.parts)
         still = all(a.response is b.response for a, b in zip(undone, side.parts, strict=True))
-        rows = stream.base.rows(undone, side.rows if still else None)
+        rows = compared.base.rows(undone, side.rows if still else None)
         unit = variant.unit if is_predicted else 1.0
-        unit *= _unit_of_curve(stream, side, variant.curve) if is_predicted and variant.curve is not None else 1.0
+        unit *= _unit_of_curve(compared, side, variant.curve) if is_predicted and variant.curve is not None else 1.0
         unit /= (
             variant.passed
-            if is_predicted and isinstance(stream.base, AutoregressiveBase) and stream.base.step == 1
+            if is_predicted and isinstance(compared.base, AutoregressiveBase) and compared.base.step == 1
             else 1.0
         )
         known = all(a.known is b.known for a, b in zip(undone, side.parts, strict=True))
-        lost = None if known else _lost_rows(stream, side, undone)
+        lost = None if known else _lost_rows(compared, side, undone)
         unit *= _spread_ratio(side, rows) if is_predicted and fault.place == "actuator" else 1.0
         found.append(Undone(rows if unit == 1.0 else tuple(unit * part for part in rows), lost))
     return found
 
 
-def _lost_rows(stream: Stream, side: Side, undone: Sequence[Part]) -> tuple[Mask, ...]:
+def _lost_rows(compared: ComparedBase, side: RecordingSet, undone: Sequence[Part]) -> tuple[Mask, ...]:
     """Rows that were known, and that what is unknown now reaches."""
-    valid = stream.base.valid_samples(undone)
-    return tuple(mask & ~_settled(now, stream.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
+    valid = compared.base.valid_samples(undone)
+    return tuple(mask & ~_settled(now, compared.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
 
 
-def _unit_of_curve(stream: Stream, side: Side, curve: Curve) -> float:
+def _unit_of_curve(compared: ComparedBase, side: RecordingSet, curve: Curve) -> float:
     """The factor that corrects for the slope of a curve, which scales errors and is no gain: by the geometric mean of
     the slope for errors of constant size, or by its effect on the errors of the side's own base, if that is larger.
     Otherwise a curve would win that is flat where errors are large, or steep where the sets differ least."""
-    weights = weights_of(side.white.T @ side.white) * stream.columns[0] / stream.columns
+    weights = weights_of(side.white.T @ side.white) * compared.columns[0] / compared.columns
     rows = np.concatenate([part[mask] for part, mask in zip(side.rows, side.masks, strict=True)])
     errors = rows @ weights
-    predicted = (stream.base.values(rows) if isinstance(stream.base, AutoregressiveBase) else rows[:, 0]) - errors
+    predicted = (compared.base.values(rows) if isinstance(compared.base, AutoregressiveBase) else rows[:, 0]) - errors
     size = max(float(np.sqrt(np.mean(errors**2))), 1e-300)
     slope = np.maximum(np.abs(curve(predicted + size) - curve(predicted - size)) / (2 * size), 1e-6)
     bent = max(float(np.mean((curve(predicted + errors) - curve(predicted)) ** 2)), 1e-300)
@@ -237,7 +245,7 @@ def _source_of(base: Base) -> tuple[str, int]:
     return ("actuator", base.axis) if isinstance(base, ForceBase) else ("sensor", base.channel)
 
 
-def _spread_ratio(side: Side, rows: Sequence[FloatArray]) -> float:
+def _spread_ratio(side: RecordingSet, rows: Sequence[FloatArray]) -> float:
     """Ratio of the standard deviations of the predicted signal before and after: a weaker actuator must not reduce all
     errors."""
     before, after = (float(np.std(np.concatenate([part[:, 0] for part in each]))) for each in (side.rows, rows))
