@@ -14,8 +14,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, draw_no_data_note, new_figure, plain_axes
 from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
 from equalizer.identification.frequency_response.octave_bins import OctaveBins, octave_bins
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _BIN_OCTAVES = 1 / 24
 """Width of a bin in which lines are averaged for drawing, octaves."""

@@ -15,8 +15,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, regress_beside_linear
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 FASTEST_HZ, STARTS = 15.0, 2
 """Fastest variation of a grip that is searched (tremor is slower: 8 to 12 Hz), and number of starting values."""

@@ -22,8 +22,7 @@ from analysis.diagnosis.balance.judged_law import (
 )
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
-from analysis.diagnosis.balance.simplest_structure import numbers_of, simplest_structure
-from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
+from analysis.diagnosis.balance.structures import Structure, StructureSearch, numbers_of, simplest_structure, values_of
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
     FURTHER_LAW_GAIN,
@@ -140,7 +139,6 @@ def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
 
 
 def family_of(effect: str) -> set[str]:
-    """Effects of the same family, which act alike; the effect alone where it has none."""
     return next((family for family in FAMILIES if effect in family), {effect})
 
 

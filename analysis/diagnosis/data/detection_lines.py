@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.types import Mask
-from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import ComplexArray
 
 _SILENT = 3e-3
 """Largest amplitude of a silent line, relative to the strongest line of its input."""

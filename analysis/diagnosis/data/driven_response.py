@@ -12,9 +12,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from analysis.diagnosis.settings import ANSWER_COHERENCE, ANSWER_DEVIATIONS
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import hann
 
 STRETCHES = 12

@@ -13,6 +13,7 @@ import numpy as np
 from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.errors.error_measure_rule import WINDOW_S
 from analysis.diagnosis.errors.evidence_from_residuals import without_gaps
 from analysis.diagnosis.errors.free_simulation import predicted_channels
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
@@ -29,8 +30,6 @@ _UNSEEN = 1e-9
 """Least singular value, relative to the largest, for which a direction of the initial state is fitted."""
 
 
-WINDOW_S = 1.0
-"""Shortest window (s)."""
 STATES = 10.0
 """Least readings of a window per state: the fitted initial state then absorbs a tenth of an error at most by chance."""
 

@@ -8,8 +8,7 @@ from analysis.diagnosis.forces.inverse_response import fast_inverse_response, in
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import end_to_end_line, filter_by_gain, low_pass_gain
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _NEARLY_STILL_HZ = 1e-6
 """Frequency at which the derivative of the inverse at 0 Hz is computed."""

@@ -18,8 +18,7 @@ import scipy.linalg
 
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 LINES_SOLVED_EACH = 2000
 """Number of lines up to which the system is solved at each line."""

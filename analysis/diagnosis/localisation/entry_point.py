@@ -26,8 +26,7 @@ from analysis.diagnosis.settings import (
     SENSOR_SHOWN,
 )
 from equalizer.plant.effect_vocabulary import Place
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _BLOCK_LINES = 8
 """Number of neighbouring (correlated) lines that count as one when two entries are compared."""

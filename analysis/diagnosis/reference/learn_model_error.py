@@ -6,10 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.choose_measure import Chosen, measure_of
-from analysis.diagnosis.errors.coloured_measure import ColouredMeasure, whiten_measure
+from analysis.diagnosis.errors.coloured_measure import (
+    ColouredMeasure,
+    WhiteningFilter,
+    whiten_measure,
+    whitening_filter,
+)
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.tuning import Tuning, tuning_of
-from analysis.diagnosis.errors.whitening_filter import WhiteningFilter, whitening_filter
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, learn_floor
 from analysis.diagnosis.localisation.mismatch_maps import cells_of

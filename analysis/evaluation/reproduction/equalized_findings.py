@@ -7,8 +7,7 @@ import numpy as np
 from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.evaluation.reproduction.played_response import PlayedResponse, played_row
 from analysis.wording import number
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 RESONANCE_HZ = (9.0, 14.0)
 """Range around the published resonance at 11 Hz."""

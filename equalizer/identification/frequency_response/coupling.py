@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def worst_coupling(response: ComplexArray) -> FloatArray:

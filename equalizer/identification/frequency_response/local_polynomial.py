@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

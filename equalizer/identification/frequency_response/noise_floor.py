@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from equalizer.identification.frequency_response.experiments import instrument_signal
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 SETTLING_S = 0.5
 """Settling time after the last excitation, before samples count as rest."""

@@ -10,9 +10,8 @@ from equalizer.identification.frequency_response.noise_floor import smooth_over_
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines, have_same_lines
 from equalizer.identification.mechanical.mechanical_response import PoleForm, free_response, pole_form, sampled_response
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Hold
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 LARGEST = 0.25
 """Largest scatter that is counted as noise, relative to a channel's largest response near a line. Segments differ more

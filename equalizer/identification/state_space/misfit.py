@@ -8,8 +8,7 @@ from equalizer.identification.frequency_response.frequency_response import BoolA
 from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 NOISE_TRUSTED = 1.1
 """Residual power over noise power below which no misfit is claimed: the noise itself is estimated from few periods."""

@@ -12,8 +12,7 @@ from math import comb
 import numpy as np
 from scipy.signal import firwin, freqz, kaiser_beta, lfilter, oaconvolve
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 STOPBAND_DB = 60.0
 """Attenuation of the filters outside their band."""

@@ -11,8 +11,7 @@ import numpy as np
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, inverse_response, regularised_inverse
 
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.baselines import (
     Inverse,
     acceleration_matching,

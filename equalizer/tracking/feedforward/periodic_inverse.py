@@ -4,8 +4,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.signal import ComplexArray, FloatArray, Signal
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
 WEIGHT = 1e-4

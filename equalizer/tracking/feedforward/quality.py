@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import ComplexArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,8 +85,6 @@ class PlayedTransient:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPlay:
-    """Result of `hapteq contact`: the wanted transient, its forces, and both playbacks."""
-
     plan: ContactPlan
     normal: FloatArray
     """(3,), of length 1."""
@@ -267,7 +265,6 @@ def _plays(done: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
 
 
 def contact_summary(done: ContactPlay) -> dict[str, Any]:
-    """Errors and peak force as values for JSON output."""
     return {
         "out": str(done.plan.out),
         "normal": done.normal.tolist(),

@@ -39,7 +39,6 @@ from study.workflows.files.importing_docs import importing_markdown
 
 
 def event_schema() -> dict[str, Any]:
-    """JSON Schema of a line of `events.jsonl`."""
     schema = EVENTS.json_schema()  # each event may carry the checksum that the log adds
     for event in schema["$defs"].values():
         if "event" in event.get("properties", {}):
@@ -48,7 +47,6 @@ def event_schema() -> dict[str, Any]:
 
 
 def session_log_markdown() -> Iterable[str]:
-    """Section of docs/formats.md on the log, its checksums and its seal."""
     yield "## Session log (`events.jsonl`) and its seal (`seal.json`)"
     yield (
         "One JSON object per line, appended and never changed; each is a fact of the schema `session_event.json`. "

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.command_gaps import bridge_gaps
 from analysis.diagnosis.data.observed_parts import parts_of
+from analysis.diagnosis.prepare_recordings import bridge_gaps
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 

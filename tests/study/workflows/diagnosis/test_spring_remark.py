@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.mechanical_model import MechanicalModel
-from study.workflows.diagnosis.spring_in_model import spring_words, with_spring
+from study.workflows.diagnosis.diagnose_recordings import spring_remark, with_spring
 
 
 @pytest.fixture
@@ -22,11 +22,11 @@ def test_the_spring_holds_the_driven_body_for_any_unit_of_the_command(two_bodies
 
 def test_without_a_spring_nothing_is_changed_or_said(two_bodies):
     assert with_spring(two_bodies, 0.0) is two_bodies
-    assert spring_words(0.0) == ()
+    assert spring_remark(0.0) == ()
 
 
 def test_what_was_done_is_reported():
-    assert spring_words(136.6) == (
+    assert spring_remark(136.6) == (
         "A virtual spring of 137 N/m held the handle at its place. It was added to the model for the comparison, and "
         "is not in improved.toml.",
     )
