@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from analysis.evaluation.proof.calibration import Calibration
-from analysis.evaluation.proof.detection import Strip, detection_strips, shares_by_size
+from analysis.evaluation.proof.detection import EffectDraws, detection_strips, shares_by_size
 from analysis.evaluation.proof.outcome import Outcome
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes, ratio_ticks
@@ -33,7 +33,7 @@ def proof_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tup
     return tuple(pictures)
 
 
-def _strips_picture(strips: Sequence[Strip]) -> Picture:
+def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
     """A row per effect: the outcome of each draw over its strength."""
     figure = new_figure(8.8, 1.3 + 0.21 * len(strips))
     axes = figure.add_subplot()

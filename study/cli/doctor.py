@@ -16,7 +16,7 @@ from study.cli.study import DataOption, DeviceOption, HandsOffOption
 
 if TYPE_CHECKING:
     from study.session.views.views import DeviceFinding
-    from study.workflows.checks.daily_check import Moving
+    from study.workflows.checks.daily_check import MotionCallbacks
     from study.workflows.checks.examine_setup import Examination
 
 NAME_WIDTH = 17
@@ -135,14 +135,14 @@ def _check_today(device: str, examination: "Examination", as_json: bool, hands_o
 
 
 @contextmanager
-def _moving(hands_off: bool) -> "Iterator[Moving]":
+def _moving(hands_off: bool) -> "Iterator[MotionCallbacks]":
     from functools import partial
 
     from study.cli.progress import late_bar
-    from study.workflows.checks.daily_check import Moving, seconds_of_play
+    from study.workflows.checks.daily_check import MotionCallbacks, seconds_of_play
 
     with late_bar("The device moves (s)", total=round(seconds_of_play())) as show:
-        yield Moving(partial(announce, hands_off=hands_off), show)
+        yield MotionCallbacks(partial(announce, hands_off=hands_off), show)
 
 
 def _calibrate(device: str) -> None:

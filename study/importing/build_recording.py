@@ -53,7 +53,7 @@ def _abbreviate_list(parts: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Built:
+class BuiltRecording:
     """A recording built from imported files, in memory."""
 
     recording: Recording
@@ -69,7 +69,7 @@ class _Part:
 
 def build_recording(
     wanted: ImportMap, files: Sequence[Path], on_progress: Callable[[float], None] = lambda share: None
-) -> Built:
+) -> BuiltRecording:
     """Read, align, resample and convert. on_progress: share done, 0 to 1. Raises CannotReadError,
     ImportRefusedError."""
     what = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
@@ -89,7 +89,7 @@ def build_recording(
     if problems := recording_problems(recording):
         raise ImportRefusedError(what, "; ".join(problems))
     notes = import_notes.sentences([part.label for part in planned])
-    return Built(recording, (*notes, *_unit_remark(wanted), *filter(None, (_odd_rate(recording), repeats))))
+    return BuiltRecording(recording, (*notes, *_unit_remark(wanted), *filter(None, (_odd_rate(recording), repeats))))
 
 
 class _Counter:

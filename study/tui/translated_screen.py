@@ -31,9 +31,9 @@ class TranslatedScreen(Screen[Reply]):
 
     def _in_words(self, active: ActiveBinding) -> ActiveBinding:
         binding, shown = active.binding, active.binding.key_display
-        spoken = replace(
+        translated = replace(
             binding,
             description=self.words.key(binding.description),
             key_display=shown and self.words.key(shown),
         )
-        return active._replace(binding=spoken)
+        return active._replace(binding=translated)

@@ -51,7 +51,7 @@ class RecordingSet:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Undone:
+class UndoneRows:
     """Rows with a fault of size 1 undone."""
 
     rows: tuple[FloatArray, ...]
@@ -81,7 +81,7 @@ class ComparedBase:
         base = self.base
         return 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / self.clean.parts[0].rate_hz
 
-    def grams(self, side: RecordingSet, changed: Sequence[Undone]) -> Grams:
+    def grams(self, side: RecordingSet, changed: Sequence[UndoneRows]) -> Grams:
         """Products of a side's rows and of their changes by undone faults; see `Grams`."""
         moved = [_changed_columns(each.rows, side.rows) for each in changed]
         kept = np.hstack([side.white, *(self._changes(side, *each) for each in zip(changed, moved, strict=True))])
@@ -91,7 +91,7 @@ class ComparedBase:
             len(self.columns),
         )
 
-    def _changes(self, side: RecordingSet, undone: Undone, at: Places) -> FloatArray:
+    def _changes(self, side: RecordingSet, undone: UndoneRows, at: Places) -> FloatArray:
         """(valid samples, k): the changes of the columns `at`, whitened."""
         differences = [part[:, at] - plain[:, at] for part, plain in zip(undone.rows, side.rows, strict=True)]
         found = _whiten(self.whitening, differences, side.masks) / (self.columns[at] * side.scale)
@@ -190,7 +190,9 @@ def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> Fl
     return np.asarray(np.concatenate([[1.0], -np.asarray(solve_toeplitz(power[:-1], power[1:]))]))
 
 
-def rows_with_fault_undone(compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant) -> list[Undone]:
+def rows_with_fault_undone(
+    compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant
+) -> list[UndoneRows]:
     """Rows with a fault of size 1 undone, one set of rows per size of the variant."""
     found = []
     # Undoing a fault of the predicted signal scales the errors: then the Jacobian of the undoing counts.
@@ -201,7 +203,9 @@ def rows_with_fault_undone(compared: ComparedBase, side: RecordingSet, fault: Fa
         changed = (
             variant.column_change(rows[:, 1:], rate_hz, part) for rows, part in zip(side.rows, side.parts, strict=True)
         )
-        return [Undone(tuple(np.hstack([rows[:, :1], more]) for rows, more in zip(side.rows, changed, strict=True)))]
+        return [
+            UndoneRows(tuple(np.hstack([rows[:, :1], more]) for rows, more in zip(side.rows, changed, strict=True)))
+        ]
     for undo in variant.undo:
         undone = tuple(undo(part) for part in side.parts)
         still = all(a.response is b.response for a, b in zip(undone, side.parts, strict=True))
@@ -216,7 +220,7 @@ def rows_with_fault_undone(compared: ComparedBase, side: RecordingSet, fault: Fa
         known = all(a.known is b.known for a, b in zip(undone, side.parts, strict=True))
         lost = None if known else _lost_rows(compared, side, undone)
         unit *= _spread_ratio(side, rows) if is_predicted and fault.place == "actuator" else 1.0
-        found.append(Undone(rows if unit == 1.0 else tuple(unit * part for part in rows), lost))
+        found.append(UndoneRows(rows if unit == 1.0 else tuple(unit * part for part in rows), lost))
     return found
 
 

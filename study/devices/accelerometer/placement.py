@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.clock_fit import ClockFit, fit_clock
-from study.devices.accelerometer.history import Stretch
+from study.devices.accelerometer.history import ArrivedSamples
 
 CORNER = 0.42
 """Frequency of the low-pass's -6 dB, relative to the lower of both rates."""
@@ -38,7 +38,7 @@ AT_ONCE = 4096
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class PlacedSamples:
     """Sensor values resampled to the ticks of the loop."""
 
     values: FloatArray
@@ -47,7 +47,7 @@ class Placed:
     """Fit of the clock to which most samples belong; None where none could be fitted."""
 
 
-def place(stretch: Stretch, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> Placed:
+def place(stretch: ArrivedSamples, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
     """values: (n, channels) of the samples; tick_s: (k,), rising, when the ticks were due, rate_hz apart."""
     host_s = np.full(len(stretch.device_s), np.nan)
     best: ClockFit | None = None
@@ -63,7 +63,7 @@ def place(stretch: Stretch, values: FloatArray, tick_s: FloatArray, rate_hz: flo
             best, most = fit, int(samples.sum())
     known = np.isfinite(host_s)
     order = np.argsort(host_s[known], kind="stable")
-    return Placed(resample(host_s[known][order], values[known][order], tick_s, rate_hz), best)
+    return PlacedSamples(resample(host_s[known][order], values[known][order], tick_s, rate_hz), best)
 
 
 def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> FloatArray:

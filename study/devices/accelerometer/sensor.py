@@ -12,9 +12,9 @@ from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.clock_fit import ClockFit
 from study.devices.accelerometer.history import History
 from study.devices.accelerometer.newest_sample import NewestSample
-from study.devices.accelerometer.placement import HALF_PERIODS, Placed, place
+from study.devices.accelerometer.placement import HALF_PERIODS, PlacedSamples, place
 from study.devices.accelerometer.samples import Counts, Source
-from study.devices.rig import Sensed
+from study.devices.rig import SensedAcceleration
 from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
 
@@ -63,13 +63,13 @@ class Accelerometer:
     def latest(self) -> tuple[FloatArray, bool]:
         return self._newest.fresh(time.monotonic())
 
-    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed:
-        """Read the sensor apart from the position: the port of `study.devices.rig.SensesApart`."""
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:
+        """Read the sensor apart from the position: the port of `study.devices.rig.OwnClockSensor`."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
-        placed = self._placed(tick_s, rate_hz) if len(tick_s) else Placed(np.zeros((0, 3)), None)
+        placed = self._placed(tick_s, rate_hz) if len(tick_s) else PlacedSamples(np.zeros((0, 3)), None)
         counts = self._history.counted(since_s)
-        return Sensed(placed.values, _health(counts, placed.values, placed.fit))
+        return SensedAcceleration(placed.values, _health(counts, placed.values, placed.fit))
 
     def rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
         """What arrived in the last seconds at rest, the standard deviation of each axis (3,) in m/s², and samples per
@@ -86,7 +86,7 @@ class Accelerometer:
         with contextlib.suppress(Exception):
             self._source.close()
 
-    def _placed(self, tick_s: FloatArray, rate_hz: float) -> Placed:
+    def _placed(self, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
         stretch = self._history.stretch(tick_s[0] - FITTED_S, time.monotonic())
         values = self._calibration.acceleration(stretch.raw) - self._rest_mps2
         return place(stretch, values, tick_s, rate_hz)

@@ -8,13 +8,13 @@ from study.devices.drive.runner import Part
 from study.devices.governor import govern
 from study.devices.governor.governor import Governor
 from study.devices.native import SLEEP
-from study.devices.rig import READING_SIZE, Halves, Rig
+from study.devices.rig import READING_SIZE, CompiledIo, Rig
 
 
-def halves_of(rig: Rig) -> Halves | None:
+def halves_of(rig: Rig) -> CompiledIo | None:
     """Compiled halves of a tick of this rig; None where the rig has none."""
     halves = getattr(rig, "halves", None)
-    return halves if isinstance(halves, Halves) else None
+    return halves if isinstance(halves, CompiledIo) else None
 
 
 TICK_PARTS = Part(govern.tick, TICK), Part(govern.publish, PUBLISH)
@@ -25,7 +25,7 @@ class CompiledTicks:
     """Runs the ticks of a rig by the compiled loop of `compiled_drive`, and gives its newest reading. The loop is
     compiled when the object is made."""
 
-    def __init__(self, halves: Halves, governor: Governor, loop_state: FloatArray) -> None:
+    def __init__(self, halves: CompiledIo, governor: Governor, loop_state: FloatArray) -> None:
         self._halves = halves
         self._governor = governor
         self._parts = Part(halves.sense, SENSE), Part(halves.write, WRITE), *TICK_PARTS

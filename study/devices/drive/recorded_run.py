@@ -10,12 +10,12 @@ from equalizer.signals.signal import FloatArray, Signal
 from study.devices.device import DeviceInfo, Fault, Health, Played
 from study.devices.governor.cells import ROW_SIZE
 from study.devices.governor.governor import Governor
-from study.devices.rig import SensesApart
+from study.devices.rig import OwnClockSensor
 
 COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) for start in range(0, ROW_SIZE, 3))
 
 
-def record_held_stimulus(governor: Governor, info: DeviceInfo, apart: SensesApart | None = None) -> Played:
+def record_held_stimulus(governor: Governor, info: DeviceInfo, apart: OwnClockSensor | None = None) -> Played:
     """Record of a held stimulus: the last of its steady part, whole loops unless the loop is longer than the ring."""
     rows, loop = governor.rows(), governor.steady
     whole = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
@@ -28,7 +28,7 @@ def record_held_stimulus(governor: Governor, info: DeviceInfo, apart: SensesApar
     return _make_played(rows, health, info, (segment,))
 
 
-def record_commands(governor: Governor, info: DeviceInfo, apart: SensesApart | None = None) -> Played:
+def record_commands(governor: Governor, info: DeviceInfo, apart: OwnClockSensor | None = None) -> Played:
     """Record of commands played once through; the caller knows which segments they are."""
     rows = governor.rows()
     if governor.fault is not Fault.NONE or len(rows) < len(governor.loop):
@@ -37,7 +37,7 @@ def record_commands(governor: Governor, info: DeviceInfo, apart: SensesApart | N
 
 
 def _with_acceleration(
-    rows: FloatArray, governor: Governor, info: DeviceInfo, apart: SensesApart | None
+    rows: FloatArray, governor: Governor, info: DeviceInfo, apart: OwnClockSensor | None
 ) -> tuple[FloatArray, Health]:
     """rows: the last ones. With the acceleration that belongs to each, of missed ticks too."""
     due_s = governor.row_due_s()

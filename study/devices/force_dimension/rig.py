@@ -19,7 +19,7 @@ from study.devices.force_dimension.handle import Handle, why_off
 from study.devices.force_dimension.library import LibraryError
 from study.devices.force_dimension.tick_io import LOCK_S
 from study.devices.native import SharedLock, system_calls
-from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, Halves, Sensed
+from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, CompiledIo, SensedAcceleration
 from study.errors import DeviceError
 
 REST_SHARE = 0.25
@@ -33,8 +33,8 @@ class Accelerometer(Protocol):
         """Acceleration (3,), m/s², NaN where there is none of now; whether a channel is at its limit. Cheap."""
         ...
 
-    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
-        """Sensor reading apart from the position: the port of `study.devices.rig.SensesApart`."""
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
+        """Sensor reading apart from the position: the port of `study.devices.rig.OwnClockSensor`."""
         ...
 
     def close(self) -> None:
@@ -75,11 +75,11 @@ class ForceDimensionRig:
             threading.Thread(target=self._rest, name="gravity compensation", daemon=True).start()
 
     @property
-    def halves(self) -> Halves | None:
+    def halves(self) -> CompiledIo | None:
         """The two halves of a compiled tick; None with an accelerometer that compiled code cannot read."""
         if self._overlaid is not None:
             return None
-        return Halves(tick_io.sense_once, tick_io.write_once, self._calls, self._cells, self._samples, self._error)
+        return CompiledIo(tick_io.sense_once, tick_io.write_once, self._calls, self._cells, self._samples, self._error)
 
     def sense(self) -> FloatArray:
         reading = np.empty(READING_SIZE)
@@ -96,7 +96,7 @@ class ForceDimensionRig:
     def write(self, force_n: FloatArray) -> None:
         self._raise_for(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
 
-    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
         return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
 
     def withhold(self, seconds: float) -> float:

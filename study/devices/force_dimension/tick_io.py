@@ -236,4 +236,4 @@ sense_once, write_once, send_once = _entry_points(
         ),
     )
 )
-"""The first two as `study.devices.rig.Halves` wants them; `send_once`: what `write_once` does with the lock."""
+"""The first two as `study.devices.rig.CompiledIo` wants them; `send_once`: what `write_once` does with the lock."""

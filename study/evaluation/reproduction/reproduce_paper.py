@@ -29,7 +29,7 @@ from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 from study.workflows.results.analyze_data import sensor_frame
 from study.workflows.results.collect_sessions import collect_sessions
-from study.workflows.results.collected import Collected
+from study.workflows.results.collected import CollectedTrials
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
 
 
@@ -142,7 +142,7 @@ def _make_folders(plan: ReproductionPlan) -> None:
             raise CannotWriteError(folder, problem) from problem
 
 
-def _sit(plan: ReproductionPlan, steps: Steps) -> Collected:
+def _sit(plan: ReproductionPlan, steps: Steps) -> CollectedTrials:
     source = read_study_protocol(plan.protocols.study, plan.study)
     rehearsal = Rehearsal(source.protocol, source.text, subjects=plan.subjects, seed=plan.seed, data=plan.study)
     tell = steps.of("study")
@@ -154,7 +154,7 @@ def _results(
     plan: ReproductionPlan,
     recordings: Mapping[str, CachedRecording],
     identified: Mapping[str, ReproducedModel],
-    collected: Collected,
+    collected: CollectedTrials,
     steps: Steps,
 ) -> Results:
     models = PlacedModels(

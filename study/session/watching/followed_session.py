@@ -39,7 +39,7 @@ class PlayedProbe:
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
+class FollowedSession:
     """A followed session: the state folded from its log, and facts that only a watcher needs."""
 
     state: SessionState
@@ -62,9 +62,9 @@ class Watched:
     """Measured ones."""
 
 
-def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> Watched:
+def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> FollowedSession:
     """The followed session after its first line."""
-    return Watched(
+    return FollowedSession(
         state=begin_session(opened, protocol),
         remarks=(),
         forms=(),
@@ -76,7 +76,7 @@ def begin_watching(opened: SessionOpened, protocol: StudyProtocol) -> Watched:
     )
 
 
-def follow(watched: Watched, event: Event) -> Watched:
+def follow(watched: FollowedSession, event: Event) -> FollowedSession:
     """The followed session after one more event. Raises LogContradiction where it cannot follow."""
     after = replace(watched, state=apply(watched.state, event), last_utc=event.utc)
     match event:
@@ -103,7 +103,7 @@ def follow(watched: Watched, event: Event) -> Watched:
             return after
 
 
-def _probe(watched: Watched, event: ProbePlayed | ProbeMeasured) -> Watched:
+def _probe(watched: FollowedSession, event: ProbePlayed | ProbeMeasured) -> FollowedSession:
     if isinstance(event, ProbePlayed):
         at_s = max(0.0, seconds_between(watched.state.opened.utc, event.utc))
         return replace(watched, playing=PlayedProbe(event.number, event.kind, event.level_n, at_s, watched.sitting))
@@ -114,5 +114,5 @@ def _probe(watched: Watched, event: ProbePlayed | ProbeMeasured) -> Watched:
     return replace(watched, playing=None, probes=(*watched.probes, kept))
 
 
-def _set_remark(watched: Watched, remark: str) -> Watched:
+def _set_remark(watched: FollowedSession, remark: str) -> FollowedSession:
     return replace(watched, remarks=(*watched.remarks[:-1], remark))

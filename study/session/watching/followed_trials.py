@@ -5,7 +5,7 @@ from protocols.procedure.schedule import Run
 from protocols.procedure.staircase import level_n
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.state.state import SessionState, current_rule, due
-from study.session.watching.followed_session import Watched
+from study.session.watching.followed_session import FollowedSession
 from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeLine, StaircasePoint, WatchedRun
 
 LAST_TRIALS = 40
@@ -74,7 +74,7 @@ def open_trial(state: SessionState, presented_s: float) -> OpenTrial | None:
     )
 
 
-def last_trials(watched: Watched) -> tuple[ClosedTrial, ...]:
+def last_trials(watched: FollowedSession) -> tuple[ClosedTrial, ...]:
     """Latest trials, newest first."""
     rows = list(zip(watched.state.trials, watched.remarks, strict=True))[-LAST_TRIALS - 1 :]
     closed = [

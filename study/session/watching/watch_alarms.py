@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.facts.log_time import Moment, elapsed_s, seconds_between
 from study.session.facts.void_reasons import computer_too_busy
-from study.session.watching.followed_session import Watched
+from study.session.watching.followed_session import FollowedSession
 from study.session.watching.live import Live
 from study.session.watching.watch_view import ON, Alarm, DriftLine, Exposure, Standing
 
@@ -31,7 +31,7 @@ NEAR = 0.8
 class Situation:
     """Everything that alarms depend on, at one moment."""
 
-    watched: Watched
+    watched: FollowedSession
     live: Live | None
     problem: str
     """Why the log cannot be followed; empty where it can."""

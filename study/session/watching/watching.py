@@ -7,7 +7,7 @@ from study.session.facts.log_time import Moment, seconds_between
 from study.session.state.sitting_state import SittingState, dose_now, pass_time
 from study.session.state.vibration_dose import a8_mps2
 from study.session.views.archive_views import TURNED_AWAY
-from study.session.watching.followed_session import Watched
+from study.session.watching.followed_session import FollowedSession
 from study.session.watching.followed_trials import (
     last_trials,
     next_level_n,
@@ -34,7 +34,7 @@ class LiveInfo:
     drifts: tuple[DriftLine, ...] = ()
 
 
-def watch_view(watched: Watched, beside: LiveInfo, now_utc: str, before: WatchView | None = None) -> WatchView:
+def watch_view(watched: FollowedSession, beside: LiveInfo, now_utc: str, before: WatchView | None = None) -> WatchView:
     """The view at `now_utc`. before: the previous view, so that a lasting alarm keeps its start time."""
     state = watched.state
     situation = _situation(watched, beside, now_utc)
@@ -76,21 +76,21 @@ def watch_view(watched: Watched, beside: LiveInfo, now_utc: str, before: WatchVi
     )
 
 
-def _situation(watched: Watched, beside: LiveInfo, now_utc: str) -> Situation:
+def _situation(watched: FollowedSession, beside: LiveInfo, now_utc: str) -> Situation:
     live = _of_this_sitting(watched, beside.live)
     standing = _find_standing(watched, live, beside.writer)
     exposure = _exposure(watched, live, standing, now_utc)
     return Situation(watched, live, beside.problem, standing, exposure, now_utc, beside.drifts)
 
 
-def _of_this_sitting(watched: Watched, live: Live | None) -> Live | None:
+def _of_this_sitting(watched: FollowedSession, live: Live | None) -> Live | None:
     """The live state, unless it is left over from an earlier sitting. Versions that log the monotonic clock remove
     it before a sitting; for others the times decide."""
     ours = live is not None and (live.monotonic_s is not None or live.utc >= watched.sitting_utc)
     return live if ours else None
 
 
-def _find_standing(watched: Watched, live: Live | None, writer: bool | None) -> Standing:
+def _find_standing(watched: FollowedSession, live: Live | None, writer: bool | None) -> Standing:
     if watched.state.turned_away_for_good:
         return watched.state.sitting.turned_away or "refused"
     if watched.state.closed:
@@ -105,7 +105,7 @@ def _find_standing(watched: Watched, live: Live | None, writer: bool | None) -> 
     return "resting" if resting else "running"
 
 
-def _reason(watched: Watched, standing: Standing) -> str:
+def _reason(watched: FollowedSession, standing: Standing) -> str:
     match standing:
         case "stopped":
             return watched.left
@@ -134,7 +134,7 @@ _WORDS = {
 }
 
 
-def _activity(watched: Watched, live: Live | None, standing: Standing) -> tuple[str, str]:
+def _activity(watched: FollowedSession, live: Live | None, standing: Standing) -> tuple[str, str]:
     """Activity in words, and since when. The log takes precedence over `live`."""
     state = watched.state
     if standing not in ON:
@@ -147,7 +147,7 @@ def _activity(watched: Watched, live: Live | None, standing: Standing) -> tuple[
     return _WORDS[live.activity], live.since_utc
 
 
-def _exposure(watched: Watched, live: Live | None, standing: Standing, now_utc: str) -> Exposure:
+def _exposure(watched: FollowedSession, live: Live | None, standing: Standing, now_utc: str) -> Exposure:
     state, limits = watched.state, watched.state.protocol.limits
     sitting = _until_now(state.sitting, live, now_utc) if standing in ON else state.sitting
     return Exposure(

@@ -26,7 +26,7 @@ from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
 from study.tui.departure import leave_with_the_terminal
 from study.tui.engine.from_engine import Failed, Finished
-from study.tui.engine.to_engine import AskBeside, Begin, LetGo, Relay, Resume, SessionOrder, ShowSession
+from study.tui.engine.to_engine import AskOtherSession, Begin, LetGo, Relay, Resume, SessionOrder, ShowSession
 from study.tui.keys.key_names import key_name
 from study.tui.keys.keys_in_order import KeysInOrder
 from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
@@ -254,7 +254,7 @@ class HapteqApp(App[None]):
         await self._archive.diagnose(wanted)
 
     def on_watch_wanted(self, wanted: home_messages.WatchWanted) -> None:
-        self._watching.confirm(wanted.path, lambda request: self._engine.send(AskBeside(wanted.path, request)))
+        self._watching.confirm(wanted.path, lambda request: self._engine.send(AskOtherSession(wanted.path, request)))
 
     def on_demo_screen_pause_wanted(self) -> None:
         self.action_pause()

@@ -21,8 +21,8 @@ from study.tui.engine.from_engine import (
     FromEngine,
     LookUpdate,
     Opened,
+    ParticipantWords,
     Preparing,
-    Spoken,
     Trouble,
 )
 from study.tui.engine.to_engine import Reply, ToEngine
@@ -122,7 +122,7 @@ class SittingScreens:
                 self._trouble(sentence)
             case Opened(path=path):
                 self.path = path
-            case Spoken(words=words):
+            case ParticipantWords(words=words):
                 self.words = words
                 if self._preparing is not None:
                     self._preparing.speak(words)

@@ -25,11 +25,11 @@ from study.tui.engine.from_engine import (
     Home,
     LayDown,
     Opened,
+    ParticipantWords,
     Preparing,
     Results,
     SensorKept,
     Session,
-    Spoken,
     Trouble,
     Withdrawn,
     Working,
@@ -38,7 +38,7 @@ from study.tui.engine.remote_display import RemoteDisplay
 from study.tui.engine.screen_link import ScreenLink
 from study.tui.engine.to_engine import (
     Analyze,
-    AskBeside,
+    AskOtherSession,
     Begin,
     CalibrateSensor,
     Command,
@@ -54,7 +54,7 @@ from study.tui.engine.to_engine import (
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_results
 from study.workflows.results.written_analysis import WrittenAnalysis
-from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
+from study.workflows.session.conduct_session import ConductedSitting, Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting, finish_closed
 from study.workflows.session.plan_sitting import plan_sitting
 from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
@@ -100,7 +100,7 @@ class EngineCommands:
                 self._diagnose(command)
             case CalibrateSensor() | KeepSensor():
                 self._calibrate(command)
-            case AskBeside(session=session, request=request):
+            case AskOtherSession(session=session, request=request):
                 send_request(SessionFolder(Path(session)), request, self._clock)
 
     def _begin(self, order: SessionOrder) -> None:
@@ -132,8 +132,8 @@ class EngineCommands:
         words = words_of(folded.state.protocol)
         self._sit(words, lambda participant: conduct_resumed(folder, command.device, participant))
 
-    def _sit(self, words: Words, conduct: Callable[[Participant], Conducted]) -> None:
-        self._link.send(Spoken(words))
+    def _sit(self, words: Words, conduct: Callable[[Participant], ConductedSitting]) -> None:
+        self._link.send(ParticipantWords(words))
         self._link.send(Preparing(words["preparing_device"]))
         with self._participant() as participant:
             end = conduct(participant)

@@ -86,7 +86,7 @@ class Diagnosis:
 
 
 @dataclass(frozen=True, slots=True)
-class Spoken:
+class ParticipantWords:
     """What the participant of the sitting reads, from here on."""
 
     words: Words
@@ -202,7 +202,7 @@ FromEngine = (
     | Session
     | Diagnosis
     | Preparing
-    | Spoken
+    | ParticipantWords
     | Working
     | LayDown
     | Calibrated

@@ -107,7 +107,7 @@ class KeepSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class AskBeside:
+class AskOtherSession:
     """Ask a session that runs in another program."""
 
     session: str
@@ -150,7 +150,7 @@ Command = (
     | Diagnose
     | CalibrateSensor
     | KeepSensor
-    | AskBeside
+    | AskOtherSession
 )
 """What the engine performs, one after another."""
 

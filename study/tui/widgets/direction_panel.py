@@ -43,14 +43,14 @@ class DirectionPanel(Widget):
 
     def __init__(self, number: int, picture: DirectionPicture | None = None, words: Words = ENGLISH_WORDS) -> None:
         super().__init__()
-        self._spoken = words
+        self._texts = words
         self.number = number
         self.set_reactive(DirectionPanel.picture, picture)
 
     def watch_mark(self, before: Mark, after: Mark) -> None:
         self.remove_class(f"-{before}")
         self.set_class(bool(after), f"-{after}")
-        self.border_subtitle = f"{self.number} {self._spoken[f'mark_{after}']}" if after else ""
+        self.border_subtitle = f"{self.number} {self._texts[f'mark_{after}']}" if after else ""
 
     def render_line(self, y: int) -> Strip:
         width, height = self.size
@@ -84,8 +84,8 @@ class DirectionPanel(Widget):
 
     def _words(self) -> str:
         if self.picture is None:
-            return self._spoken["interval_first" if self.number == 1 else "interval_second"]
-        return sentence(self.picture, self.number, self._spoken)
+            return self._texts["interval_first" if self.number == 1 else "interval_second"]
+        return sentence(self.picture, self.number, self._texts)
 
 
 def _room(size: Size) -> Size:

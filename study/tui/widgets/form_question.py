@@ -28,7 +28,7 @@ class FormQuestion(Vertical):
         super().__init__()
         self.field = field
         self._number = number
-        self._spoken = words
+        self._texts = words
 
     def compose(self) -> ComposeResult:
         yield LiteralText(f"{self._number}. {self.field.label}")
@@ -58,9 +58,9 @@ class FormQuestion(Vertical):
 
     def _answer_text(self, given: FieldEntry, at: bool) -> Text:
         if not given.answer:
-            hint = self._spoken["form_type" if self.field.needed else "form_type_or_not"]
+            hint = self._texts["form_type" if self.field.needed else "form_type_or_not"]
             if self.field.limits is not None:
-                hint = f"{hint} ({limits_words(self.field.limits, self._spoken)})"
+                hint = f"{hint} ({limits_words(self.field.limits, self._texts)})"
             text = Text(hint, "dim")
             if at:
                 text.stylize("reverse", 0, 1)

@@ -16,7 +16,14 @@ from study.session.views.local_time import local_column
 from study.tui.home_messages import ResumeWanted, SessionWanted, WatchWanted
 from study.tui.session_status import STYLES, status_text
 
-_NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = "Session", "Standing", "Begun", "Runs", "Answers", "Protocol"
+_NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = (
+    "Session",
+    "Standing",
+    "SessionParticipant",
+    "Runs",
+    "Answers",
+    "Protocol",
+)
 _FIXED = {_STANDING: 12, _RUNS: 5, _ANSWERS: 7}
 """Widths in cells, so that little has to be measured in a long list. The protocol gets the remaining width, and
 wraps."""

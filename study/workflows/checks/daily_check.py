@@ -35,7 +35,7 @@ BASELINES, CHECKS = "baselines", "daily_checks"
 
 
 @dataclass(frozen=True, slots=True)
-class Moving:
+class MotionCallbacks:
     """Callbacks while the device moves by itself."""
 
     announce: Callable[[str], None]
@@ -57,7 +57,7 @@ def seconds_of_play() -> float:
     return RecordingPlan(_protocol(), "", (0.0, 0.0, 0.0), 1, Path()).total_s
 
 
-def record_baseline(name: str, moving: Moving) -> tuple[str, str]:
+def record_baseline(name: str, moving: MotionCallbacks) -> tuple[str, str]:
     """Record the baseline of the daily checks. Returns its name in `device_folder` and its SHA-256. Raises StudyError,
     also where the recording is not good enough for a comparison."""
     plan = _plan(name, BASELINES)
@@ -65,7 +65,7 @@ def record_baseline(name: str, moving: Moving) -> tuple[str, str]:
         return _baseline_on(device, plan, moving)
 
 
-def _baseline_on(device: Device, plan: RecordingPlan, moving: Moving) -> tuple[str, str]:
+def _baseline_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> tuple[str, str]:
     record_on(device, plan, moving.show, moving.announce)
     recorded = read_recording(plan.out)
     facts = recorded.meta["segments"]
@@ -91,14 +91,14 @@ def require_real(name: str) -> None:
         raise WrongUseError("There is nothing to compare with", f"{name!r} is never accepted.", "Leave --daily out.")
 
 
-def check_today(name: str, moving: Moving) -> CheckedToday:
+def check_today(name: str, moving: MotionCallbacks) -> CheckedToday:
     """Play the excitation of the baseline and write what changed. Raises StudyError."""
     plan = _plan(name, CHECKS)
     with contextlib.closing(_open(plan)) as device:
         return check_on(device, plan, moving)
 
 
-def check_on(device: Device, plan: RecordingPlan, moving: Moving) -> CheckedToday:
+def check_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> CheckedToday:
     """Carry out the check of `check_today` on an open device."""
     baseline, digest = _accepted_recording(device.info, plan.protocol)
     begun: list[str] = []

@@ -18,7 +18,7 @@ from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_installation import Terminal, check_installation
 from study.workflows.checks.check_timing import Timing, check_timing
 from study.workflows.checks.computer_load import load_per_processor
-from study.workflows.checks.daily_check import Moving, record_baseline
+from study.workflows.checks.daily_check import MotionCallbacks, record_baseline
 from study.workflows.device_settings import device_settings
 
 PROTOCOL = "direction_threshold"
@@ -125,7 +125,7 @@ def require_sensor(examination: Examination) -> None:
         )
 
 
-def accept(name: str, examination: Examination, operator: str, moving: Moving) -> str:
+def accept(name: str, examination: Examination, operator: str, moving: MotionCallbacks) -> str:
     """Record the baseline of the daily checks and sign that the device may be held, after an examination with timing.
     Without an accelerometer there is no baseline. Raises DeviceError, WrongUseError."""
     if not needs_real_time(name):

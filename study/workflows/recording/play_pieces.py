@@ -18,7 +18,7 @@ MOST_TRIES = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Take:
+class PlayedPiece:
     """A piece as finally played, clean unless `clipped`."""
 
     piece: Piece
@@ -46,7 +46,7 @@ def is_clipped(health: Health) -> bool:
 
 
 def play_pieces(
-    protocol: RecordingProtocol, device: Device, done: list[Take], on_progress: Callable[[float], None]
+    protocol: RecordingProtocol, device: Device, done: list[PlayedPiece], on_progress: Callable[[float], None]
 ) -> None:
     """Play the whole protocol, appending each finished piece to `done`. `on_progress(seconds)` steps back where a piece
     is repeated. A lowered amplitude is kept for later rounds of the same segment.
@@ -73,7 +73,7 @@ def play_pieces(
 
 def _take(
     protocol: RecordingProtocol, device: Device, piece: Piece, share: float, on_share: Callable[[float], None]
-) -> Take:
+) -> PlayedPiece:
     """The first clean take, or the last one."""
     requested_n = piece.segment.amplitude
     least_n = min(protocol.least_amplitude_n, requested_n)
@@ -87,7 +87,7 @@ def _take(
         sensor_before += health.sensor_clipped
         total_before += health.total_clipped + health.feedback_clipped
         amplitude_n = max(LOWERED_TO * amplitude_n, least_n)
-    return Take(played, requested_n, tries, sensor_before, total_before, recording, health)
+    return PlayedPiece(played, requested_n, tries, sensor_before, total_before, recording, health)
 
 
 def _once(device: Device, piece: Piece, on_share: Callable[[float], None]) -> tuple[Recording, Health]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from protocols.definition.apparatus import SpringSettings
 from study.session.facts.sensor_facts import SensorFacts
-from study.workflows.recording.play_pieces import Take, along_in_words
+from study.workflows.recording.play_pieces import PlayedPiece, along_in_words
 
 
 def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, Any]:
@@ -20,7 +20,7 @@ def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, 
     }
 
 
-def segment_facts(take: Take) -> dict[str, Any]:
+def segment_facts(take: PlayedPiece) -> dict[str, Any]:
     """Metadata of one piece."""
     piece = take.piece
     return {
@@ -39,7 +39,7 @@ def segment_facts(take: Take) -> dict[str, Any]:
     }
 
 
-def warnings_of(take: Take) -> list[str]:
+def warnings_of(take: PlayedPiece) -> list[str]:
     """Warnings for the person who recorded."""
     health, what = take.health, _what(take)
     found = []
@@ -65,13 +65,13 @@ def _sensor_warning(sensor: SensorFacts, what: str) -> str:
     return f"{packets} ({what}); at {sensor.unplaced_ticks} of {sensor.ticks} ticks its acceleration is NaN."
 
 
-def _what(take: Take) -> str:
+def _what(take: PlayedPiece) -> str:
     piece = take.piece
     kind = f"{piece.frequency_hz:g} Hz" if piece.frequency_hz else piece.segment.kind
     return f"{kind} along {along_in_words(piece)}"
 
 
-def _reduction_warning(take: Take) -> str:
+def _reduction_warning(take: PlayedPiece) -> str:
     why = []
     if take.sensor_clipped_before:
         why.append(f"the accelerometer clipped in {take.sensor_clipped_before} samples")

@@ -21,7 +21,7 @@ from study.store.sessions.archive import SessionFolder, session_folders
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
 from study.workflows.run_on_executor import finished_pieces
-from study.workflows.session.conduct_session import Conducted, conduct_new, conduct_resumed
+from study.workflows.session.conduct_session import ConductedSitting, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import create_participant
 from study.workflows.worker_processes import worker_processes
@@ -137,7 +137,7 @@ def play_apart(rehearsal: Rehearsal, model: Files, number: int) -> tuple[str, Fi
         return conducted.folder.name, read_files(conducted.folder.path), conducted.left
 
 
-def _play_new(rehearsal: Rehearsal, number: int) -> Conducted:
+def _play_new(rehearsal: Rehearsal, number: int) -> ConductedSitting:
     observer, seed = rehearsed_observer(rehearsal, number), subject_seed(rehearsal.seed, number)
     plan = SessionPlan(
         protocol=rehearsal.protocol,

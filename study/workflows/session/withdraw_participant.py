@@ -16,7 +16,7 @@ from study.store.disk.real_folder import RealFolder, is_real_file, is_real_folde
 from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder, withdrawal_file
 from study.store.sessions.event_log import LOG_NAME, hold_log_lock
 from study.store.sessions.session_lock import LOCK_NAME, hold_session_lock
-from study.store.sessions.withdrawal_files import Intent, read_intent, write_intent, write_tombstone
+from study.store.sessions.withdrawal_files import WithdrawalIntent, read_intent, write_intent, write_tombstone
 from study.store.sessions.written_elsewhere import folders_written_elsewhere
 from study.workflows.session.participant_number import begun_in
 from study.workflows.session.participant_traces import analysis_names, find_traces
@@ -92,7 +92,7 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
             earlier = read_intent(data, subject)
             begun = {folder.name: begun_in(folder) for folder in folders}
             since = earlier.withdrawn_utc if earlier else utc
-            write_intent(data, Intent(subject, since, begun, withdrawal.derived))
+            write_intent(data, WithdrawalIntent(subject, since, begun, withdrawal.derived))
             for name in withdrawal.derived:
                 _erase_derived(place, name)
             for folder in folders:

@@ -14,7 +14,7 @@ LONGEST_FIRST_BYTES = 2**20
 
 
 @dataclass(frozen=True, slots=True)
-class Described:
+class StreamDescription:
     """A stream of samples as other programs see it."""
 
     name: str
@@ -47,13 +47,13 @@ class MarkerOutlet:
     def push(self, marker: str, at_s: float) -> None:
         self._outlet.push_sample([marker], at_s)
 
-    def signal_outlet(self, stream: Described, rate_hz: float) -> SignalOutlet:
+    def signal_outlet(self, stream: StreamDescription, rate_hz: float) -> SignalOutlet:
         """Another outlet of the same session."""
         return _Signals(self._library, f"{self._source} {stream.name}", stream, rate_hz)
 
 
 class _Signals:
-    def __init__(self, library: Any, source: str, stream: Described, rate_hz: float) -> None:
+    def __init__(self, library: Any, source: str, stream: StreamDescription, rate_hz: float) -> None:
         info = library.StreamInfo(stream.name, stream.kind, len(stream.channels), rate_hz, "double64", source)
         channels = info.desc().append_child("channels")
         for label, unit in zip(stream.channels, stream.units, strict=True):

@@ -51,7 +51,7 @@ class Outlet(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class SideTasks:
     """What else is done between two looks at the log."""
 
     on_offset: Callable[[float], None]
@@ -60,7 +60,7 @@ class Beside:
     """Given that offset: sends what the device's loop did meanwhile, and answers how many ticks were lost."""
 
 
-NOTHING_BESIDE = Beside(lambda offset_s: None, lambda offset_s: 0)
+NOTHING_BESIDE = SideTasks(lambda offset_s: None, lambda offset_s: 0)
 
 
 class LogFollower:
@@ -88,7 +88,7 @@ def stream_session(
     on_marker: Callable[[str], None],
     now_s: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
-    beside: Beside = NOTHING_BESIDE,
+    beside: SideTasks = NOTHING_BESIDE,
 ) -> int:
     """Follow the log until the session is closed or Ctrl-C; of one that is closed already nothing is sent. Returns how
     many facts became markers. Raises StudyError."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.contrast.bases import bases_of
-from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, Undone, compare_base
+from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, UndoneRows, compare_base
 from analysis.diagnosis.contrast.decide import decide
 from analysis.diagnosis.contrast.part import split_into_parts
 
@@ -49,7 +49,7 @@ def test_a_side_with_too_few_rows_is_not_compared(rig):
 def test_what_undoing_a_fault_loses_stays_as_it_was(compared):
     rows = tuple(np.zeros_like(part) for part in compared.faulty.rows)
     half = tuple(np.arange(len(part)) < len(part) // 2 for part in rows)
-    blocks = compared.grams(compared.faulty, [Undone(rows, half)]).undo_sizes(np.ones(1))
+    blocks = compared.grams(compared.faulty, [UndoneRows(rows, half)]).undo_sizes(np.ones(1))
     plain = compared.grams(compared.faulty, []).blocks
     assert np.allclose(blocks[:8], plain[:8])
     assert np.abs(blocks[-8:]).max() < 1e-3 * np.abs(plain[-8:]).max()

@@ -18,7 +18,7 @@ from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.governor import cells
 from study.devices.governor.governor import Governor
 from study.devices.native import CLOCK, SLEEP, SYSTEM_SIZE, SharedLock, address_of, call_int, system_calls
-from study.devices.rig import READING_SIZE, Halves
+from study.devices.rig import READING_SIZE, CompiledIo
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 
@@ -147,7 +147,7 @@ class ScriptedRig:
         self._calls = np.append(system_calls(SharedLock()), address_of(clock.work))
         self._calls[CLOCK], self._calls[SLEEP] = address_of(clock.now), address_of(clock.wait)
         self._own, self._samples = np.array([float(fails_at), 0.0]), np.zeros((1, 1))
-        self.halves = Halves(tremble, work, self._calls, self._own, self._samples, lambda code: OSError(code))
+        self.halves = CompiledIo(tremble, work, self._calls, self._own, self._samples, lambda code: OSError(code))
 
     def sense(self):
         reading = np.empty(READING_SIZE)
