@@ -229,7 +229,7 @@ def _inseparable(effect: NamedEffect) -> tuple[str, ...]:
 
 
 _PLAIN = {"unexpected_keyword_argument": "this key is not known here", "missing": "this is missing"}
-"""What pydantic says in words of its own trade, by its kind of error."""
+"""Plain texts in place of pydantic's technical ones, by the type of its error."""
 
 
 def _sentence(place: tuple[str | int, ...], message: str) -> str:

@@ -22,7 +22,7 @@ FASTEST_HZ, STARTS = 15.0, 2
 _POINTS_PER_LINE = 16
 """Zero padding of the spectrum, in points per line: the rate is then found to a sixteenth of a line."""
 _LEAST_DENOMINATOR = 0.2
-"""Of the implicit step: keeps its sign where negative damping would be strong within a step."""
+"""Least denominator of the implicit step: keeps it positive where negative damping is strong within a step."""
 
 
 @compile_law

@@ -35,7 +35,7 @@ HIGHEST_PLAUSIBLE = {
     "stale_s": 5.0,
     "still_s": 60.0,
 }
-"""As in `protocols.definition.plausibility`; repeated here for settings that come from no protocol."""
+"""Bounds as in `protocols.definition.plausibility`, repeated for settings that come from no protocol."""
 
 RATES_HZ = (100.0, 10_000.0)
 """Accepted rates of a device's loop (Hz)."""

@@ -153,7 +153,7 @@ class SharedLock:
 
 
 _monotonic = ctypes.CFUNCTYPE(ctypes.c_double)(time.monotonic)
-"""For systems whose own clock is not read here: it takes the interpreter lock."""
+"""Clock for systems whose own is not read here: it takes the interpreter lock."""
 
 
 def address_of(function: Any) -> int:

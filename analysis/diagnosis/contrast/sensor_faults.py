@@ -32,7 +32,7 @@ from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Read = Callable[[FloatArray, float], FloatArray]
-"""From the readings of one channel (n,) at a rate to those without the fault."""
+"""Function that removes a fault: readings of one channel (n,) and their rate (Hz) to readings without the fault."""
 WIDELY = (0.5, 1.6)
 """Range of sizes, as `AROUND`, for faults that act nearly in proportion to their size."""
 GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)

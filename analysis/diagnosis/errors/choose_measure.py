@@ -23,7 +23,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 Compared = Literal["auto", "motion", "force"]
-"""What a user asks to be compared; auto: selected by the rule."""
+"""Signals that the user asks to be compared; auto: selected by the rule."""
 
 DITHER = 0.02
 """Noise in steps of a converter below which differences between repeats do not show the noise."""

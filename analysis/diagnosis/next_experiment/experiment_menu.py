@@ -19,7 +19,7 @@ USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
 ADDED_SHARE = 0.12
 """Known weight to attach, relative to the grounded mass."""
 RELEASES = 4
-"""How often the handle is let go, to either side in turn."""
+"""Releases of the deflected handle in a free-decay experiment, to either side in turn."""
 _FADE = 1 / 16
 """Fade at both ends, over an experiment's usual length."""
 

@@ -20,7 +20,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_part import band_part
 
 Invert = Callable[[FloatArray], FloatArray]
-"""From wanted accelerations (N, p) to forces (N, m); linear, one row to one."""
+"""Linear inverse of the device: wanted accelerations (N, p) to forces (N, m), row by row."""
 
 SURE = 3.0
 """Standard deviations above the noise floor from which a residual is more than noise."""

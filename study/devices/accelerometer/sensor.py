@@ -19,7 +19,7 @@ from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
 
 ZEROING_S = 0.5
-"""At rest, when it is opened: gravity, and the drift of the bias since the calibration."""
+"""Time at rest when it is opened (s), whose mean is subtracted: gravity, and the bias's drift since calibration."""
 
 FITTED_S = 120.0
 """Before a recording, and the recording: to their arrivals the clock is fitted. Long enough for 1 ppm, and short enough

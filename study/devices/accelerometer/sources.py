@@ -25,7 +25,7 @@ PAUSE_S = 0.01
 """Between two reads: so much comes at once."""
 
 DUMMY_V = -9999.0
-"""In the place of a scan that a LabJack lost."""
+"""Value in place of a scan that a LabJack lost."""
 
 
 def open_source(port: str, baud: int) -> Source:

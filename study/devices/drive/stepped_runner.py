@@ -54,7 +54,7 @@ class Standby:
 
 
 ZERO_PATIENCE_S = 0.1
-"""For a zero force to be written: a hundred times what a driver takes."""
+"""Longest wait for a zero force to be written (s): a hundred times what a driver takes."""
 
 CLOSE_PATIENCE_S = 1.0
 """Longest wait for the driver to close its device (s)."""

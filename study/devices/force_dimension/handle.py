@@ -33,7 +33,7 @@ WATCHDOG_CAUSE = 3
 """The library's code for forces that the device's watchdog switched off."""
 
 TRIES = 3
-"""To stop a device whose connection fails."""
+"""Attempts to stop a device whose connection fails."""
 
 
 def why_off(cause: int) -> str:

@@ -23,7 +23,7 @@ LINES = ("work", "signs", "look", "stop", "close")
 stop."""
 
 VALUE, ERROR, PROGRESS = range(3)
-"""What a message is. After PROGRESS the other side waits for a bool: whether to go on."""
+"""Kinds of messages. After PROGRESS the other side waits for a bool: whether to go on."""
 
 
 GRACE_S = 0.5

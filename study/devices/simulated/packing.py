@@ -1,4 +1,4 @@
-"""From named parameters to the flat arrays of the compiled functions."""
+"""Packs named parameters into the flat array of the compiled functions (`layout`)."""
 
 import math
 

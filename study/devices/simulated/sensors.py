@@ -1,4 +1,4 @@
-"""What a tick reads: encoders of finite resolution, and an ADXL335 with noise, range and mounting errors.
+"""Simulated sensors: encoders of finite resolution, and an ADXL335 with noise, range and mounting errors.
 
 Its normal random numbers come from one 64-bit word of state (SplitMix64: G. L. Steele, D. Lea, C. H. Flood, "Fast
 splittable pseudorandom number generators", OOPSLA 2014), so that a recording depends on its seed alone.

@@ -21,7 +21,7 @@ from study.workflows.run_on_executor import finished_pieces
 PATIENCE_S = 1200.0
 """Longest wait for one case (s); a case takes seconds to a minute."""
 GLANCE_S = 0.5
-"""How often the calling thread checks that workers still run (s)."""
+"""Interval at which the calling thread checks that workers still run (s)."""
 TRIES = 2
 """Attempts per case: a process that died may have been killed from outside."""
 

@@ -6,7 +6,7 @@ from protocols.definition.recording_protocol import RecordingProtocol
 from study.errors import StudyError
 
 BeforeMoving = Callable[[str], None]
-"""Told a notice for the people around a real device; an exception from it keeps the device still."""
+"""Shows a notice to the people around a real device; an exception from it keeps the device still."""
 
 
 def refuse_unannounced(notice: str) -> None:

@@ -18,7 +18,7 @@ HANDLE_AWAY_S = 2.0
 UNANSWERED_S = 60.0
 """Answers take seconds; after this time the participant may need help."""
 JUST_NOW_S = 60.0
-"""How long the end of a sitting is reported."""
+"""Time for which the end of a sitting is reported (s)."""
 CATCH_TRIALS, LAPSES = 5, 2
 """This many wrong ones among the last five catch trials: an attentive participant misses none at full level."""
 PRESENTATIONS, VOIDS = 10, 3

@@ -152,6 +152,6 @@ Command = (
     | KeepSensor
     | AskOtherSession
 )
-"""What the engine performs, one after another."""
+"""Commands that the engine performs one after another."""
 
 ToEngine = Command | Relay | LetGo | Heartbeat | Reply

@@ -1,4 +1,4 @@
-"""What a participant reads before the first trial."""
+"""Instructions to the participant before the first trial."""
 
 from typing import ClassVar
 

@@ -18,7 +18,7 @@ from study.workflows.trial.sitting import Sitting, record
 
 PLACED = b'"event":"place_taken"'
 NUMBER = re.compile(rb'"participant_number":(\d{1,6})\b')
-"""In the first line, and in that of the place; the last occurrence counts."""
+"""The number in a log: in its opening line, or in the event that replaces it; the last occurrence counts."""
 PROTOCOL_NAME = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
 OF_A_PERSON = b'"observer":null'
 PRESENTED = b'"event":"trial_presented"'

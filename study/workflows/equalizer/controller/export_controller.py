@@ -1,4 +1,4 @@
-"""From a model file to C sources of its controller."""
+"""`hapteq export-controller`: C sources of the real-time controller of an identified model."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
