@@ -16,7 +16,7 @@ from study.session.state.due_trial import Present
 from study.session.state.machine import Finish, Rest, next_action
 from study.session.watching.followed_session import FollowedSession, begin_watching, follow
 from study.session.watching.live import Live
-from study.session.watching.watching import LiveInfo, watch_view
+from study.session.watching.make_watch_view import LiveInfo, watch_view
 from tests.session_facts import opened, presented
 
 BEGAN = datetime(2026, 11, 22, 10, 0, tzinfo=UTC)

@@ -171,7 +171,7 @@ def masking_sound(samples: "Samples", rate_hz: int) -> "MaskingSound":
     return MaskingSound(samples, rate_hz, open_stream)
 
 
-def before_others() -> AbstractContextManager[object]:
+def raise_thread_priority() -> AbstractContextManager[object]:
     """The calling thread, until it ends, as a real device's loop: before all other programs where that is allowed."""
     from study.devices.drive.real_time_class import real_time_class
 

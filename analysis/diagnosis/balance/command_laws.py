@@ -175,7 +175,7 @@ def _deadband_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AnyCommandLaw:
+class PiecewiseCommandLaw:
     """A sum of simple functions that approximates any law of a kind: where it is no better than the command itself,
     none of the laws need be tried."""
 
@@ -188,7 +188,7 @@ class AnyCommandLaw:
         return self.columns(command, position)
 
 
-def any_curve(command: FloatArray) -> AnyCommandLaw:
+def piecewise_curve(command: FloatArray) -> PiecewiseCommandLaw:
     """A piecewise linear function of the command with jumps, separate for each sign. command: (n,), whose range the
     nodes span."""
     bends = np.unique(np.quantile(np.abs(command), NODE_QUANTILES))
@@ -199,10 +199,10 @@ def any_curve(command: FloatArray) -> AnyCommandLaw:
         jumps = [np.where(side > bend, 1.0, 0.0) for side in sides for bend in bends]
         return np.stack([u, sides[0], *beyond, *jumps], axis=1)
 
-    return AnyCommandLaw(columns, 2 + 2 * len(bends))
+    return PiecewiseCommandLaw(columns, 2 + 2 * len(bends))
 
 
-def any_pull(position: FloatArray) -> AnyCommandLaw:
+def piecewise_pull(position: FloatArray) -> PiecewiseCommandLaw:
     """The command and its square, each with a gain that is piecewise linear in the position. position: (n,), whose
     range the nodes span."""
     bends = np.unique(np.quantile(position, NODE_QUANTILES))
@@ -211,4 +211,4 @@ def any_pull(position: FloatArray) -> AnyCommandLaw:
         gains = [np.ones_like(x), x - bends[0], *(np.maximum(x - bend, 0.0) for bend in bends)]
         return np.stack([force * gain for force in (u, u**2) for gain in gains], axis=1)
 
-    return AnyCommandLaw(columns, 4 + 2 * len(bends))
+    return PiecewiseCommandLaw(columns, 4 + 2 * len(bends))

@@ -37,7 +37,7 @@ def find_segments(recording: Recording) -> tuple[Recording, str]:
     if recording.segments:
         return recording, ""
     parts = parts_of(recording)
-    decided = decided_command(recording).samples
+    decided = designed_command(recording).samples
     periods = [exact_period(decided[start:stop]) for start, stop in parts]
     if not any(periods):
         return recording, ""
@@ -48,7 +48,7 @@ def find_segments(recording: Recording) -> tuple[Recording, str]:
     return replace(recording, segments=segments), _segments_sentence(segments)
 
 
-def decided_command(recording: Recording) -> Signal:
+def designed_command(recording: Recording) -> Signal:
     """The signal that was designed beforehand: the excitation where one was recorded and varies, else the command."""
     excitation = recording.excitation
     if excitation is None:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.errors.evidence_from_residuals import evidence_of
 from equalizer.effects.effect import AxisForce, Effect, JointForce, PlacedEffect
 from equalizer.effects.simulation.bodies import Restarts
@@ -70,7 +70,7 @@ class FreeSimulation:
     ) -> FloatArray:
         """States of the simulation just before given samples of a record: positions and velocities (k, 2n)."""
         signals = record.recording
-        every = under_conditions((*self.known, *effects), signals)
+        every = effects_under_conditions((*self.known, *effects), signals)
         model = add_carried_weight(model, signals)
         return states_before(model, record.command, (signals.sample_rate_hz, signals.hold), every, at)
 
@@ -86,7 +86,9 @@ class FreeSimulation:
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         model = add_carried_weight(model, signals)
-        every = [_coarsen(placed, self.coarser) for placed in under_conditions((*self.known, *effects), signals)]
+        every = [
+            _coarsen(placed, self.coarser) for placed in effects_under_conditions((*self.known, *effects), signals)
+        ]
         if joined is not None:
             sampled = signals.sample_rate_hz, signals.hold
             return simulate_windows(model, record.command, sampled, every, measurement, joined)

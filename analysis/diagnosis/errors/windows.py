@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.errors.error_measure_rule import WINDOW_S
 from analysis.diagnosis.errors.evidence_from_residuals import without_gaps
 from analysis.diagnosis.errors.free_simulation import predicted_channels
@@ -97,7 +97,7 @@ class Windows:
             model,
             record.command,
             (recording.sample_rate_hz, recording.hold),
-            under_conditions(effects, recording),
+            effects_under_conditions(effects, recording),
             Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
             Restarts(length * np.arange(len(states)), states),
         )

@@ -7,7 +7,7 @@ from typing import Self, TypeVar, cast
 import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.forces.inverse_dynamics import BandMotion, RequiredForce, band_motion, required_force
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
 from equalizer.effects.simulation.along_motion import actuator_force, force_along
@@ -98,7 +98,7 @@ class PredictedForce:
         next_force = np.concatenate([required.force[1:], required.force[-1:]])
         axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
         unbalanced = applied.within - (required.force + next_force) / 2
-        effects = under_conditions(effects, record.recording)
+        effects = effects_under_conditions(effects, record.recording)
         added = force_along(structure, effects, axis_motion, (record.command, unbalanced), rate_hz)
         # Both are means over the step that begins at a sample; the required force is the mean around the sample.
         total = applied.around

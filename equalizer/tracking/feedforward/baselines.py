@@ -26,7 +26,7 @@ class Inverse:
     """Multiply-adds per sample for all channels."""
 
 
-def no_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
+def no_equalization(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
     """No equalization: the wanted number in m/s² is commanded in N."""
     return Inverse("nothing", _constant_response(np.eye(*model.D.shape[::-1]), frequency_hz), 0)
 

@@ -41,12 +41,12 @@ from study.devices.force_dimension.loop_cells import (
     TOO_STRONG,
     WEAK,
     WITHHELD_UNTIL_S,
-    beyond,
     check_on,
-    failed,
+    count_beyond_share,
     look,
     note_sent,
-    of_library,
+    record_failure,
+    record_library_failure,
 )
 from study.devices.governor.compiling import fingerprint, part
 from study.devices.native import Addresses, acquire, call_int, now_s, release
@@ -97,15 +97,15 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
     answer = call_int(calls[POSITION], asked)
     if answer < 0:
-        return of_library(cells, POSITION)
+        return record_library_failure(cells, POSITION)
     if cells[READS] % LOOK_EVERY == 0.0:
         code = look(calls, cells)
         if code != 0:
             return code
     cells[READS] += 1.0
-    cells[REPEATED] = beyond(cells[REPEATED], answer == STALE, STALE_SHARE)
+    cells[REPEATED] = count_beyond_share(cells[REPEATED], answer == STALE, STALE_SHARE)
     if cells[REPEATED] >= STALE_FOR * (1.0 - STALE_SHARE):
-        return failed(cells, REPEATS)
+        return record_failure(cells, REPEATS)
     reading[SENSOR_CLIPPED] = 0.0
     if samples.shape[0] > 1:
         _sense_acceleration(samples, now_s(calls), reading)
@@ -132,10 +132,10 @@ def _wake(calls: Addresses, cells: FloatArray) -> int:
         return code
     number = np.int32(cells[NUMBER])
     if call_int(calls[BRAKES], (np.int32(0), number)) < 0:
-        return of_library(cells, BRAKES)
+        return record_library_failure(cells, BRAKES)
     if call_int(calls[ENABLE], (np.int32(1), number)) < 0:
-        return of_library(cells, ENABLE)
-    return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else of_library(cells, FORCE)
+        return record_library_failure(cells, ENABLE)
+    return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else record_library_failure(cells, FORCE)
 
 
 @part
@@ -148,20 +148,20 @@ def _send(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     x, y, z = force[0], force[1], force[2]
     answer = _set_force(calls, cells, x, y, z)
     if answer < 0:
-        return of_library(cells, FORCE)
+        return record_library_failure(cells, FORCE)
     cells[SENT_S] = now_s(calls)
     note_sent(cells, x, y)
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
-    cells[TOO_STRONG] = beyond(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
+    cells[TOO_STRONG] = count_beyond_share(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
     if cells[TOO_STRONG] >= SCALED_FOR * (1.0 - SCALED_SHARE):
-        return failed(cells, WEAK)
+        return record_failure(cells, WEAK)
     return 0
 
 
 @part
 def _zero(calls: Addresses, cells: FloatArray) -> int:
     if _set_force(calls, cells, 0.0, 0.0, 0.0) < 0:
-        return of_library(cells, FORCE)
+        return record_library_failure(cells, FORCE)
     if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
         # A force was cut off: its call may hang still, and must find a device that takes none.
         code = check_on(calls, cells)
@@ -197,12 +197,12 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
         code = _write_zero(calls, cells)
         if cells[FAILED] == 0.0:
             cells[REFUSED_N] = norm
-        return code if code != 0 else failed(cells, REFUSED)
+        return code if code != 0 else record_failure(cells, REFUSED)
     if cells[FAILED] != 0.0:
         return FAILED_BEFORE
     if not acquire(calls, LOCK_S):
-        return failed(cells, LOCKED)
-    code = _send(calls, cells, force) if cells[CLOSED] == 0.0 else failed(cells, IS_CLOSED)
+        return record_failure(cells, LOCKED)
+    code = _send(calls, cells, force) if cells[CLOSED] == 0.0 else record_failure(cells, IS_CLOSED)
     release(calls)
     return code
 

@@ -20,7 +20,7 @@ def norm_of(x: float, y: float, z: float) -> float:
 
 
 @part
-def below(vector: FloatArray, bound: float) -> bool:
+def is_bounded(vector: FloatArray, bound: float) -> bool:
     """False for NaN and infinity too."""
     return bool(abs(vector[0]) < bound and abs(vector[1]) < bound and abs(vector[2]) < bound)
 
@@ -43,7 +43,7 @@ def kept_share(norm: float, cap: float) -> float:
 @part
 def confine(force: FloatArray, cap: float) -> bool:
     """Shorten to the cap, direction kept; zero if it is no force at all. Whether it was above the cap."""
-    if not (below(force, OVERFLOWING) and cap > 0.0):
+    if not (is_bounded(force, OVERFLOWING) and cap > 0.0):
         clear(force)
         return False
     norm = norm_of(force[0], force[1], force[2])

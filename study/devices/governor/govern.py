@@ -19,7 +19,7 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import fingerprint, part
-from study.devices.governor.confine import BEYOND, WITHIN, below, clear, confine, norm_of
+from study.devices.governor.confine import BEYOND, WITHIN, clear, confine, is_bounded, norm_of
 from study.devices.governor.feedback import add_feedback
 from study.devices.governor.plausibility import fault_of_reading
 from study.devices.governor.telemetry_row import write_row
@@ -156,7 +156,7 @@ def _compute_force(
         for i in range(3):
             force[i] = loop[row, i]
     _update_elapsed(state, settings)
-    fault = fault_of_reading(state, settings, reading) if below(force, IMPLAUSIBLE_N) else NOT_A_NUMBER
+    fault = fault_of_reading(state, settings, reading) if is_bounded(force, IMPLAUSIBLE_N) else NOT_A_NUMBER
     if fault != NO_FAULT:
         _start_safety_fade(state, fault)
         return

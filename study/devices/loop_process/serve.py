@@ -21,7 +21,7 @@ from equalizer.signals.signal import Signal
 from study.devices.clock import RealClock
 from study.devices.device import Device, Played
 from study.devices.loop_process.line import CLOSE_S, ERROR, LINES, PROGRESS, VALUE, End
-from study.devices.opening import before_others, open_device
+from study.devices.opening import open_device, raise_thread_priority
 
 LOOK_EVERY_S = 0.2
 """Whether the caller's process is there still: a fork of it may hold its end of a pipe open."""
@@ -49,13 +49,13 @@ class DeviceServer:
         device: Device,
         ends: tuple[End, ...],
         at_rest: Callable[[], object] = lambda: None,
-        before_others: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
+        raise_thread_priority: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     ) -> None:
-        """ends: of `LINES`. at_rest: called after each stimulus. before_others: entered by the threads that a stop and
-        a sign of life wait for."""
+        """ends: of `LINES`. at_rest: called after each stimulus. raise_thread_priority: entered by the threads that
+        a stop and a sign of life wait for."""
         self._device = device
         self._at_rest = at_rest
-        self._before_others = before_others
+        self._raise_priority = raise_thread_priority
         self._closed = threading.Event()
         self.ended = threading.Event()
         """The caller is gone, or wants the device closed."""
@@ -88,7 +88,7 @@ class DeviceServer:
     def _serve(self, end: End, table: dict[str, Callable[..., Any]]) -> None:
         urgent = "stop" in table or "keep_alive" in table
         try:
-            with self._before_others() if urgent else contextlib.nullcontext():
+            with self._raise_priority() if urgent else contextlib.nullcontext():
                 while not self._closed.is_set():
                     name, arguments = end.recv()
                     end.send(_answer(table[name], arguments))
@@ -160,7 +160,7 @@ def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
         gc.freeze()
         gc.disable()
         ends[0].send((VALUE, device.info))
-        server = DeviceServer(device, ends, at_rest=gc.collect, before_others=before_others)
+        server = DeviceServer(device, ends, at_rest=gc.collect, raise_thread_priority=raise_thread_priority)
         server.start()
         while not (server.ended.wait(LOOK_EVERY_S) or lifetime.is_over()):
             pass

@@ -38,7 +38,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.real_answer_file import read_answer_and_origin, write_real_answer
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
-from study.workflows.forked_map import processor_s, unforked
+from study.workflows.forked_map import processor_s, without_forking
 from study.workflows.run_on_executor import finished_pieces
 
 RETUNED_NAME = "retuned.toml"
@@ -187,7 +187,7 @@ def _sent_answers(
 
 def answer_sent_recording(folder: str, name: str, files: Files) -> Files:
     """Runs on a worker: the results of one recording. folder, files: the sub-folder that it lies in."""
-    with TemporaryDirectory() as place, unforked():
+    with TemporaryDirectory() as place, without_forking():
         plan = RealPlan(Path(place) / "recordings", Path(place) / "out")
         write_files(plan.folder / folder, files)
         found = read_real_folder(plan.folder)

@@ -1,4 +1,4 @@
-"""Trials and runs of a followed session, as shown to the experimenter. Part of `study.session.watching.watching`."""
+"""Trials and runs of a followed session, as shown to the experimenter. Used by `make_watch_view`."""
 
 from protocols.procedure.practice import PracticeState, practice_passed, right_of_last
 from protocols.procedure.schedule import Run

@@ -31,7 +31,7 @@ from study.tui.keys.key_names import key_name
 from study.tui.keys.keys_in_order import KeysInOrder
 from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
 from study.tui.themes import NEXT, register_themes
-from study.tui.watch.watching import Watching
+from study.tui.watch.watch_in_app import Watching
 
 
 class HapteqApp(App[None]):
@@ -164,12 +164,12 @@ class HapteqApp(App[None]):
             self._leave(ExitCode.INTERRUPTED)
             return
         self._engine.send(LetGo())
-        panel = self._letting_go = self._panel(outcomes.letting_go(self._words), "")
+        panel = self._letting_go = self._panel(outcomes.stop_told_panel(self._words), "")
         self.set_timer(outcomes.UNHEARD_AFTER_S, lambda: self._unheard(panel))
 
     def _unheard(self, panel: OutcomeScreen) -> None:
         if self._letting_go is panel:
-            panel.tell(outcomes.unheard(self._words))
+            panel.tell(outcomes.stop_unanswered_panel(self._words))
             self.bell()
 
     async def action_quit(self) -> None:

@@ -57,7 +57,7 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import ConductedSitting, Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting, finish_closed
 from study.workflows.session.plan_sitting import plan_sitting
-from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
+from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
 from study.workflows.trial.display import PersonsHand
 from study.workflows.views.list_sessions import home_view, model_words, protocol_line
 from study.workflows.views.send_request import send_request
@@ -161,7 +161,7 @@ class EngineCommands:
 
     def _withdraw(self, folder: SessionFolder) -> None:
         data, plan = folder.path.parent, plan_withdrawal(folder)
-        elsewhere = still_elsewhere(data, plan)
+        elsewhere = copies_elsewhere(data, plan)
         withdraw(data, plan, self._clock.utc())
         for sentence in (*plan.doubtful, *elsewhere):
             self._link.send(Trouble(sentence))

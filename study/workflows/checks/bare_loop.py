@@ -45,7 +45,7 @@ class BareLoop:
     late_ticks: int
     """Ticks whose work ended after the next was due, missed ones included."""
     latest_s: float
-    before_others: bool
+    raised_priority: bool
     """Whether it got the real-time priority that was requested."""
 
 
@@ -58,7 +58,7 @@ class BareRun:
 
 
 @contextlib.contextmanager
-def timed_beside(seconds: float, rate_hz: float, before_others: bool) -> Iterator[BareRun]:
+def run_bare_loop_beside(seconds: float, rate_hz: float, raised_priority: bool) -> Iterator[BareRun]:
     """Run a bare loop during the block or, where that is shorter, to its own end; the result is available after the
     block."""
     run = BareRun()
@@ -67,7 +67,7 @@ def timed_beside(seconds: float, rate_hz: float, before_others: bool) -> Iterato
         if program is None:
             yield run
             return
-        words = [str(program), f"{seconds:g}", f"{rate_hz:g}", str(PRIORITY if before_others else 0)]
+        words = [str(program), f"{seconds:g}", f"{rate_hz:g}", str(PRIORITY if raised_priority else 0)]
         try:
             process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
         except OSError as problem:

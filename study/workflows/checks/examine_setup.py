@@ -13,7 +13,7 @@ from study.session.stimulus.timing_verdict import judge_load
 from study.session.views.handle_notice import limit_test_notice
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.store.formats.protocol_files import read_study_protocol
-from study.workflows.checks.bare_loop import judge_beside, timed_beside
+from study.workflows.checks.bare_loop import judge_beside, run_bare_loop_beside
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_installation import Terminal, check_installation
 from study.workflows.checks.check_timing import Timing, check_timing
@@ -94,7 +94,7 @@ def _examine_device(
 
 def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
     load, simulated = load_per_processor(), device.info.simulated
-    with timed_beside(seconds, device.info.sample_rate_hz, before_others=not simulated) as run:
+    with run_bare_loop_beside(seconds, device.info.sample_rate_hz, raised_priority=not simulated) as run:
         timing = check_timing(device, clock, seconds, on_progress, load)
     # A simulated device's own loop is never late: there, the wake-ups of this program are compared.
     late, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks

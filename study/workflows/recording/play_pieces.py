@@ -95,12 +95,12 @@ def _once(device: Device, piece: Piece, on_share: Callable[[float], None]) -> tu
     if played.recording is None or played.health.fault is not Fault.NONE:
         raise DeviceError(
             "The device let go",
-            f"While recording along {along_in_words(piece)}: {played.health.fault.value}.",
+            f"While recording along {direction_text(piece)}: {played.health.fault.value}.",
             "Check the device and record again.",
         )
     return played.recording, played.health
 
 
-def along_in_words(piece: Piece) -> str:
+def direction_text(piece: Piece) -> str:
     """The direction of a piece for a sentence: an axis, or "all axes"."""
     return "all axes" if piece.along == "all" else piece.along

@@ -6,7 +6,7 @@ from typing import Any
 
 from protocols.definition.apparatus import SpringSettings
 from study.session.facts.sensor_facts import SensorFacts
-from study.workflows.recording.play_pieces import PlayedPiece, along_in_words
+from study.workflows.recording.play_pieces import PlayedPiece, direction_text
 
 
 def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, Any]:
@@ -68,7 +68,7 @@ def _sensor_warning(sensor: SensorFacts, what: str) -> str:
 def _what(take: PlayedPiece) -> str:
     piece = take.piece
     kind = f"{piece.frequency_hz:g} Hz" if piece.frequency_hz else piece.segment.kind
-    return f"{kind} along {along_in_words(piece)}"
+    return f"{kind} along {direction_text(piece)}"
 
 
 def _reduction_warning(take: PlayedPiece) -> str:

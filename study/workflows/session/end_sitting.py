@@ -15,7 +15,7 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import ConductedSitting
 from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.session.resume_session import already_finished
-from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
+from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
 
 DEVICE_ADVICE = "Run hapteq doctor --device NAME, which says what is wrong with it, and mend that. "
 OF_THE_DEVICE = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
@@ -66,7 +66,7 @@ def _not_finished(end: ConductedSitting) -> StudyError:
 
 def _erase(end: ConductedSitting, utc: str) -> StudyError:
     data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
-    elsewhere = still_elsewhere(data, plan)
+    elsewhere = copies_elsewhere(data, plan)
     withdraw(data, plan, utc)
     return UserInterruptError(
         "The participant withdrew",

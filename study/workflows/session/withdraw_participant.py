@@ -105,7 +105,7 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
         raise _not_everything(data, withdrawal, problem) from problem
 
 
-def still_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
+def copies_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
     """Sentences on copies outside the data folder that were noted when they were written."""
     noted = [path for path in folders_written_elsewhere(data) if path.exists()]
     named = [path for path in noted if analysis_names(path, withdrawal.subject) is not False]

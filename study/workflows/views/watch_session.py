@@ -13,10 +13,10 @@ from study.session.state.draw_check import LogContradiction
 from study.session.watching.followed_session import FollowedSession, begin_watching
 from study.session.watching.followed_session import follow as after
 from study.session.watching.live import Live
+from study.session.watching.make_watch_view import LiveInfo, watch_view
 from study.session.watching.requests import Request
 from study.session.watching.watch_alarms import SILENT_AFTER_S
 from study.session.watching.watch_view import DriftLine, WatchView
-from study.session.watching.watching import LiveInfo, watch_view
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live
 from study.store.sessions.log_seal import read_seal, seal_paths

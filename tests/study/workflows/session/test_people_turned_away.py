@@ -18,7 +18,7 @@ from study.session.views.archive_views import TURNED_AWAY
 from study.session.views.form_views import FormKind, FormReply
 from study.session.views.views import Unanswered
 from study.session.watching.followed_session import begin_watching, follow
-from study.session.watching.watching import LiveInfo, watch_view
+from study.session.watching.make_watch_view import LiveInfo, watch_view
 from study.store.sessions.event_log import read_log
 from study.store.sessions.log_seal import seal_paths
 from study.tui.session_status import describe
