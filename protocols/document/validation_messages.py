@@ -76,10 +76,10 @@ def _translate_error(root: Node, error: Any) -> tuple[Problem, ...]:
         return (_wrong_kind_of_entry(root, place, error),)
     node = node_at(root, place)
     name = str(place[-1]) if isinstance(place[-1], str) else str(place[-2])
-    return (Problem(key, _wrong(error), describe_allowed(root, node, name) if node else "something else"),)
+    return (Problem(key, _problem_text(error), describe_allowed(root, node, name) if node else "something else"),)
 
 
-def _wrong(error: Any) -> str:
+def _problem_text(error: Any) -> str:
     value = error["input"]
     match error["type"]:
         case "missing":

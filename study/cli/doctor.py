@@ -85,7 +85,7 @@ def doctor(
     if as_json:
         typer.echo(json.dumps(_document(examination), indent=2))
     else:
-        _say(examination)
+        _print_findings(examination)
     if accept is not None:
         _accept(device, examination, accept, hands_off)
     if examination.exit_code:
@@ -171,7 +171,7 @@ def _calibrate_sensor(port: str, baud: int, keep: bool) -> None:
     typer.echo(table)
 
 
-def _say(examination: "Examination") -> None:
+def _print_findings(examination: "Examination") -> None:
     timing = examination.timing
     parts = {
         "Installation": examination.installation,

@@ -55,12 +55,12 @@ def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
     limits = settings.limits
     times = {name: getattr(limits, name) for name in HIGHEST if name != "keep_s"} | {"keep_s": settings.keep_s}
     for name, value in times.items():
-        _within(name, value, HIGHEST[name])
+        _check_within(name, value, HIGHEST[name])
     _check_caps(settings, info)
     for name, highest in HIGHEST_PLAUSIBLE.items():
-        _within(f"plausibility.{name}", getattr(limits.plausibility, name), highest, zero=name == "friction_n")
-    _within("spring_frequency_hz", settings.spring_frequency_hz, 10.0, zero=True)
-    _within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, zero=True)
+        _check_within(f"plausibility.{name}", getattr(limits.plausibility, name), highest, zero=name == "friction_n")
+    _check_within("spring_frequency_hz", settings.spring_frequency_hz, 10.0, zero=True)
+    _check_within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, zero=True)
     if not all(math.isfinite(component) for component in settings.place_m):
         raise _settings_error(f"place_m is {settings.place_m}; it must be three numbers, in metres.")
 
@@ -139,12 +139,12 @@ def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
         raise _settings_error("beyond_hand_ceiling is set while a hand is on the handle.")
     ceiling_n = info.max_force_n if beyond else min(info.max_force_n, HAND_TOTAL_CAP_N)
     stimulus_ceiling_n = ceiling_n if beyond else min(ceiling_n, HAND_STIMULUS_CAP_N)
-    _within("total_cap_n", limits.total_cap_n, ceiling_n)
-    _within("feedback_cap_n", limits.feedback_cap_n, ceiling_n if beyond else HAND_TOTAL_CAP_N)
-    _within("stimulus_cap_n", limits.stimulus_cap_n, min(stimulus_ceiling_n, limits.total_cap_n))
+    _check_within("total_cap_n", limits.total_cap_n, ceiling_n)
+    _check_within("feedback_cap_n", limits.feedback_cap_n, ceiling_n if beyond else HAND_TOTAL_CAP_N)
+    _check_within("stimulus_cap_n", limits.stimulus_cap_n, min(stimulus_ceiling_n, limits.total_cap_n))
 
 
-def _within(name: str, value: float, highest: float, *, zero: bool = False) -> None:
+def _check_within(name: str, value: float, highest: float, *, zero: bool = False) -> None:
     if not (0 < value <= highest or (zero and value == 0)):
         allowed = "at least 0" if zero else "above 0"
         raise _settings_error(f"{name} is {value:g}; it must be {allowed} and at most {highest:g}.")

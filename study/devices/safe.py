@@ -102,9 +102,9 @@ class SafeDevice:
         return Fault.STOPPED if self._governor.stop_asked and fault is not Fault.FORCE_LEFT else fault
 
     def health(self) -> Health:
-        return self._told(replace(self._governor.health(), fault=self.fault()))
+        return self._with_missed_ticks(replace(self._governor.health(), fault=self.fault()))
 
-    def _told(self, health: Health) -> Health:
+    def _with_missed_ticks(self, health: Health) -> Health:
         failure = self._runner.failure
         if failure is None:
             return health
@@ -118,7 +118,7 @@ class SafeDevice:
         self._wait_until_still(stimulus.fade_out_s)
         self._held = None
         played = record_held_stimulus(self._governor, self._info, self._apart)
-        return replace(played, health=self._told(played.health))
+        return replace(played, health=self._with_missed_ticks(played.health))
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
         self._must_be_idle()

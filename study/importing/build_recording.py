@@ -82,7 +82,7 @@ def build_recording(
         budget = Budget()
         for number, part in enumerate(planned):
             counter = _Counter(number * steps / len(planned), steps, on_progress)
-            parts.append(_part(wanted, part, import_notes, counter, budget))
+            parts.append(_build_part(wanted, part, import_notes, counter, budget))
         recording, repeats = find_segments(_concatenate(wanted, parts, units))
     except ImportProblemError as error:
         raise ImportRefusedError(what, str(error)) from error
@@ -103,7 +103,9 @@ class _Counter:
         self.on_progress(min(1.0, self.done / self.steps))
 
 
-def _part(wanted: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _Counter, budget: Budget) -> _Part:
+def _build_part(
+    wanted: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _Counter, budget: Budget
+) -> _Part:
     read: dict[Path, Arrays] = {}
     loggers = []
     notes: list[str] = []

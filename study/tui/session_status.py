@@ -32,12 +32,12 @@ def describe(line: SessionLine) -> str:
     """One or two sentences about a session in a list, and what can be done with it."""
     match line.standing:
         case "finished":
-            return f"{_who(line)} finished all {_runs(line.runs)} with {_answers(line)}."
+            return f"{_observer_text(line)} finished all {_runs(line.runs)} with {_answers(line)}."
         case "unfinished":
             done = f"{line.runs_done} of {_runs(line.runs)} done, {_answers(line)}"
-            return f"{_who(line)} is not finished: {done}. It can be resumed."
+            return f"{_observer_text(line)} is not finished: {done}. It can be resumed."
         case "running":
-            return f"{_who(line)} is running now in another program. You can watch it."
+            return f"{_observer_text(line)} is running now in another program. You can watch it."
         case "refused" | "excluded":
             return f"{line.name} is over: {TURNED_AWAY[line.standing]}. The person does not take part."
         case "withdrawn":
@@ -46,7 +46,7 @@ def describe(line: SessionLine) -> str:
             return f"{line.name} cannot be read. {line.remark}".rstrip()
 
 
-def _who(line: SessionLine) -> str:
+def _observer_text(line: SessionLine) -> str:
     return f"{line.name}{f' (simulated: {line.observer})' if line.observer else ''}"
 
 

@@ -27,7 +27,7 @@ def finished_pieces(
     try:
         while True:
             for key, arguments in islice(waiting, ahead - len(running)):
-                running[executor.submit(_work, tuple(sys.argv), function, arguments)] = key
+                running[executor.submit(_run_in_worker, tuple(sys.argv), function, arguments)] = key
             if not running:
                 return
             done = wait(running, return_when=FIRST_COMPLETED).done
@@ -40,7 +40,7 @@ def finished_pieces(
             future.cancel()
 
 
-def _work(command: tuple[str, ...], function: Callable[..., Result], arguments: tuple[Any, ...]) -> Result:
+def _run_in_worker(command: tuple[str, ...], function: Callable[..., Result], arguments: tuple[Any, ...]) -> Result:
     """Runs in a worker. command: what was typed, which the provenance of results says, and not how a worker began."""
     sys.argv = list(command)
     return function(*arguments)

@@ -69,7 +69,7 @@ def motions_in_own_band(records: Sequence[Observed], motions: Sequence[Motion]) 
 def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
     """Masks of the samples in which the device moves; empty where it moves most of the time. At rest, friction balances
     any force: no law predicts it, and linear terms would replace it."""
-    moving = [_moves(motion, motions) for motion in motions]
+    moving = [_is_moving(motion, motions) for motion in motions]
     if np.mean(np.concatenate(moving)) > MOVES_MOST_OF_THE_TIME:
         return ()
     return [
@@ -78,7 +78,7 @@ def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) ->
     ]
 
 
-def _moves(motion: Motion, motions: Sequence[Motion]) -> Mask:
+def _is_moving(motion: Motion, motions: Sequence[Motion]) -> Mask:
     """(n,): whether any channel is faster than the threshold for standstill."""
     squares = np.concatenate([each.velocity[each.fit] ** 2 for each in motions]).mean(axis=0)
     return np.asarray((motion.velocity**2 > STILL_SHARE * squares).any(axis=1))

@@ -249,12 +249,12 @@ def simplest_structure(search: StructureSearch) -> Structure:
     enough = [each for each in search.ranked if each.error <= allowed]
     plain = min(enough, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=search.linear)
     ceiling = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
-    while (richer := _further(search, plain, ceiling)) is not None:
+    while (richer := _add_further_laws(search, plain, ceiling)) is not None:
         plain = richer
     return plain
 
 
-def _further(search: StructureSearch, plain: Structure, ceiling: float) -> Structure | None:
+def _add_further_laws(search: StructureSearch, plain: Structure, ceiling: float) -> Structure | None:
     """The structure with further laws that explain most of what all laws together could still explain; None = none
     such."""
     allowed = plain.error - max(FURTHER_LAW_OF_REST * (plain.error - ceiling), FURTHER_LAW_OF_ALL * plain.error)

@@ -26,7 +26,7 @@ def likely_delays_s(compared_bases: Sequence[ComparedBase]) -> tuple[float, ...]
     found = []
     for compared in _of_device(compared_bases):
         late = _rows_late(compared)
-        found += [float(late + by) * compared.row_s for by in _around() if late]
+        found += [float(late + by) * compared.row_s for by in _offsets_around() if late]
     return tuple(dict.fromkeys(found))
 
 
@@ -38,11 +38,11 @@ def likely_clock_rates(compared_bases: Sequence[ComparedBase]) -> tuple[ClockRat
         for runs_on in (True, False) if any(part.start > 0 for part in compared.faulty.parts) else (True,):
             rate, end = _likeliest_rate(compared, runs_on)
             if abs(rate) * end >= 1:
-                found += [ClockRate(rate + by / end, LATE_STEP / end, runs_on) for by in _around()]
+                found += [ClockRate(rate + by / end, LATE_STEP / end, runs_on) for by in _offsets_around()]
     return tuple(found)
 
 
-def _around() -> list[float]:
+def _offsets_around() -> list[float]:
     """Offsets in rows from a likely delay to those that are tried."""
     return [float(by) for by in np.arange(-0.5, 0.51, LATE_STEP)]
 

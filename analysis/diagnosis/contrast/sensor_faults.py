@@ -80,7 +80,7 @@ def sensor_faults(number: int, name: str, parts: Sequence[Part], rows: Rows) -> 
     shares = [side * share for share in BENT for side in (1.0, -1.0)]
     yield channel.fault("sensor_nonlinearity", [_nonlinearity(channel, share, 3, "cubic") for share in shares])
     yield channel.fault("sensor_asymmetry", [_nonlinearity(channel, share, 2, "square") for share in shares])
-    yield channel.fault("sensor_play", [_play(channel, share * channel.rms) for share in PLAYS])
+    yield channel.fault("sensor_play", [_backlash(channel, share * channel.rms) for share in PLAYS])
     for other in range(longest.response.shape[1]):
         if other != number:
             yield _cross_axis_sensitivity(channel, other)
@@ -123,7 +123,7 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 
 
-def _play(channel: _Channel, gap: float) -> Variant:
+def _backlash(channel: _Channel, gap: float) -> Variant:
     return Variant((channel.of(lambda y, rate: _undo_play(y, gap)),), proportional_number("gap", gap), *WIDELY)
 
 

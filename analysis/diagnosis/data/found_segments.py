@@ -42,7 +42,7 @@ def find_segments(recording: Recording) -> tuple[Recording, str]:
     if not any(periods):
         return recording, ""
     segments = tuple(
-        Segment(start, stop, _kind(decided[start:stop], period), _peak(recording.command, start, stop), period)
+        Segment(start, stop, _segment_kind(decided[start:stop], period), _peak(recording.command, start, stop), period)
         for (start, stop), period in zip(parts, periods, strict=True)
     )
     return replace(recording, segments=segments), _segments_sentence(segments)
@@ -123,7 +123,7 @@ def _is_same(later: FloatArray, before: FloatArray) -> bool:
     return True
 
 
-def _kind(command: FloatArray, period: int) -> str:
+def _segment_kind(command: FloatArray, period: int) -> str:
     if not period:
         return "noise"
     power = np.sum(np.abs(np.fft.rfft(command[:period] - command[:period].mean(axis=0), axis=0)) ** 2, axis=1)

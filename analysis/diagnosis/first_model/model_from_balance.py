@@ -93,11 +93,13 @@ def share_within(balances: Sequence[Balance], band_hz: float) -> float:
         for place in (regression.places[law] for law in laws):
             own = weights[begin : begin + place.stop - place.start]
             begin += len(own)
-            shares.append(_below([rows[:, place] @ own for rows in regression.columns], regression.motions, band_hz))
+            shares.append(
+                _mean_force([rows[:, place] @ own for rows in regression.columns], regression.motions, band_hz)
+            )
     return min(shares)
 
 
-def _below(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
+def _mean_force(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
     """The mean over all recordings is subtracted: where each runs one way, the friction differs between recordings at
     frequency zero."""
     within, whole, mean = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))

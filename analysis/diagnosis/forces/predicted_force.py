@@ -53,7 +53,7 @@ class PredictedForce:
 
     def shorten(self) -> "PredictedForce":
         kept = [
-            (self._cut(record), motion)
+            (self._shorten_record(record), motion)
             for record, motion in zip(self.records, self.motions, strict=True)
             if (record.fit | record.choose).any()
         ]
@@ -65,7 +65,7 @@ class PredictedForce:
         whole = motion.position
         return motion if count == len(whole) else band_motion(whole[:count], motion.sample_rate_hz, self.band_hz)
 
-    def _cut(self, record: Observed) -> Observed:
+    def _shorten_record(self, record: Observed) -> Observed:
         """The record cut after the last sample to fit or to choose by, less the edge that the filter distorts."""
         cut, edge = record.shorten(), edge_samples(record.recording.sample_rate_hz, self.band_hz)
         inside = np.arange(len(cut.command)) < len(cut.command) - edge

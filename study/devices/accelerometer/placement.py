@@ -74,7 +74,7 @@ def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_
     period_s = float(np.median(np.diff(sample_s)))
     lower_hz = min(rate_hz, 1.0 / period_s)
     half_s = HALF_PERIODS / lower_hz
-    whole = _whole(sample_s, tick_s, half_s, LONGEST_GAP / lower_hz)
+    whole = _is_without_gap(sample_s, tick_s, half_s, LONGEST_GAP / lower_hz)
     # Samples lie closer where the board was late: each counts for the time that it stands for.
     stands_for_s = np.gradient(sample_s)
     window = np.kaiser(4097, KAISER_BETA)[2048:]
@@ -91,7 +91,7 @@ def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_
     return placed
 
 
-def _whole(sample_s: FloatArray, tick_s: FloatArray, half_s: float, longest_s: float) -> np.ndarray:
+def _is_without_gap(sample_s: FloatArray, tick_s: FloatArray, half_s: float, longest_s: float) -> np.ndarray:
     """(k,), whether the samples about each tick are without a gap."""
     inside = (tick_s - half_s >= sample_s[0] - longest_s) & (tick_s + half_s <= sample_s[-1] + longest_s)
     gaps = np.flatnonzero(np.diff(sample_s) > longest_s)

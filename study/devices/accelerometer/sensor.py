@@ -67,7 +67,7 @@ class Accelerometer:
         """Read the sensor apart from the position: the port of `study.devices.rig.OwnClockSensor`."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
-        placed = self._placed(tick_s, rate_hz) if len(tick_s) else PlacedSamples(np.zeros((0, 3)), None)
+        placed = self._resample_to_ticks(tick_s, rate_hz) if len(tick_s) else PlacedSamples(np.zeros((0, 3)), None)
         counts = self._history.counted(since_s)
         return SensedAcceleration(placed.values, _health(counts, placed.values, placed.fit))
 
@@ -77,7 +77,7 @@ class Accelerometer:
         now_s = time.monotonic()
         stretch = self._history.stretch(now_s - seconds, now_s)
         noise = self._calibration.acceleration(stretch.raw).std(axis=0) if len(stretch.raw) else np.full(3, np.nan)
-        fit = self._placed(np.array([now_s]), 1000.0).fit
+        fit = self._resample_to_ticks(np.array([now_s]), 1000.0).fit
         return _health(self._history.counted(now_s - seconds), np.zeros((0, 3)), fit), noise, len(stretch.raw) / seconds
 
     def close(self) -> None:
@@ -86,7 +86,7 @@ class Accelerometer:
         with contextlib.suppress(Exception):
             self._source.close()
 
-    def _placed(self, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
+    def _resample_to_ticks(self, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
         stretch = self._history.stretch(tick_s[0] - FITTED_S, time.monotonic())
         values = self._calibration.acceleration(stretch.raw) - self._rest_mps2
         return place(stretch, values, tick_s, rate_hz)

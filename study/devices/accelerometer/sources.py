@@ -31,10 +31,12 @@ DUMMY_V = -9999.0
 def open_source(port: str, baud: int) -> Source:
     """Raises `DeviceError`."""
     if port.startswith(NI):
-        return _opened(lambda: NiSource(port.removeprefix(NI)), port, "nidaqmx", "ni", "NI-DAQmx from ni.com")
+        return _open_source(lambda: NiSource(port.removeprefix(NI)), port, "nidaqmx", "ni", "NI-DAQmx from ni.com")
     if port.startswith(LABJACK):
         name = port.removeprefix(LABJACK)
-        return _opened(lambda: LabJackSource(name), port, "labjack-ljm", "labjack", "the LJM library from labjack.com")
+        return _open_source(
+            lambda: LabJackSource(name), port, "labjack-ljm", "labjack", "the LJM library from labjack.com"
+        )
     return open_serial(port, baud)
 
 
@@ -122,7 +124,7 @@ class LabJackSource:
             self._ljm.close(self._handle)
 
 
-def _opened(opener: Callable[[], Source], port: str, package: str, extra: str, driver: str) -> Source:
+def _open_source(opener: Callable[[], Source], port: str, package: str, extra: str, driver: str) -> Source:
     try:
         return opener()
     except ImportError as error:

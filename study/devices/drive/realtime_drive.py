@@ -130,7 +130,7 @@ class RealtimeDrive:
         self._awake = threading.Event()
         self._glances = Glances(clock, wake=self._wake)
         self._closing = False
-        self._thread = threading.Thread(target=self._attend, name="haptic loop", daemon=True)
+        self._thread = threading.Thread(target=self._run_ticks, name="haptic loop", daemon=True)
         self._thread.start()
 
     def start(self, begin: Callable[[], None]) -> bool:
@@ -234,7 +234,7 @@ class RealtimeDrive:
             return True
         return not self._runner.catches_up and bool(self._clock.now_s() - self._loop_state[LAST_S] > LATE_S)
 
-    def _attend(self) -> None:
+    def _run_ticks(self) -> None:
         with real_time_class() if self._first else contextlib.nullcontext():
             self._attend_until_closed()
 

@@ -29,7 +29,7 @@ class Standby:
     def __init__(self, action: Callable[[], bool | None], name: str) -> None:
         self._action = action
         self._asked: SimpleQueue[SimpleQueue[bool] | None] = SimpleQueue()
-        threading.Thread(target=self._work, name=name, daemon=True).start()
+        threading.Thread(target=self._run_thread, name=name, daemon=True).start()
 
     def run(self, patience_s: float) -> bool:
         """Whether it was done within patience_s, with neither an error nor False. It goes on even if the caller is
@@ -45,7 +45,7 @@ class Standby:
         """After what was asked for so far."""
         self._asked.put(None)
 
-    def _work(self) -> None:
+    def _run_thread(self) -> None:
         while (answer := self._asked.get()) is not None:
             try:
                 answer.put(self._action() is not False)
@@ -93,7 +93,7 @@ class SteppedRunner:
 
     @property
     def seen(self) -> LastReading | None:
-        if self._gone:
+        if self._is_gone:
             return None
         reading = self._compiled.seen() if self._compiled is not None else None
         return self._seen if reading is None else LastReading(reading, self._rig.buttons())
@@ -107,11 +107,11 @@ class SteppedRunner:
         """What moves by itself needs no telling."""
 
     @property
-    def _gone(self) -> bool:
+    def _is_gone(self) -> bool:
         return bool(self.loop_state[GONE])
 
     def glance(self) -> None:
-        if self._gone:
+        if self._is_gone:
             return
         try:
             self._seen = LastReading(self._read(), self._rig.buttons())
@@ -119,15 +119,15 @@ class SteppedRunner:
             self._seen = None
 
     def run(self, ticks: int) -> None:
-        if self._gone:
+        if self._is_gone:
             self._governor.abandon(Fault.LOST)
             return
-        with self._attended():
+        with self._handle_failures():
             if self._compiled is not None:
                 self._conclude(self._compiled.run(ticks))
                 return
             for _ in range(ticks):
-                if self._tick() or self._gone:
+                if self._tick() or self._is_gone:
                     break
 
     def attend(self) -> int:
@@ -135,16 +135,16 @@ class SteppedRunner:
         `attends`. Never raises for a failing rig."""
         assert self._compiled is not None
         code = OVER
-        if self._gone:
+        if self._is_gone:
             self._governor.abandon(Fault.LOST)
             return code
-        with self._attended():
+        with self._handle_failures():
             code = self._compiled.attend()
             self._conclude(code)
         return code
 
     @contextlib.contextmanager
-    def _attended(self) -> Iterator[None]:
+    def _handle_failures(self) -> Iterator[None]:
         """Around ticks: what is done where they fail."""
         try:
             yield
@@ -154,7 +154,7 @@ class SteppedRunner:
             self._silence(Fault.STALLED)
             raise
         finally:
-            if self._gone:
+            if self._is_gone:
                 self._once_more()
 
     def _conclude(self, code: int) -> None:
@@ -192,7 +192,7 @@ class SteppedRunner:
     def _tick(self) -> bool:
         governor = self._governor
         reading = self._read()
-        if self._gone:
+        if self._is_gone:
             return True
         if self._now_s is not None:
             governor.state[cells.STAMP_S] = self._now_s()

@@ -72,7 +72,7 @@ class ForceDimensionRig:
         self._failure: DeviceError | None = None
         self._closed = threading.Event()
         if rests and drops_force_after_s > 0:
-            threading.Thread(target=self._rest, name="gravity compensation", daemon=True).start()
+            threading.Thread(target=self._repeat_zero_force, name="gravity compensation", daemon=True).start()
 
     @property
     def halves(self) -> CompiledIo | None:
@@ -149,7 +149,7 @@ class ForceDimensionRig:
                 self._accelerometer.close()
         return bool(self._cells[loop_cells.LET_GO])
 
-    def _rest(self) -> None:
+    def _repeat_zero_force(self) -> None:
         """Repeat a zero force. Never sends one between two forces, nor anything after a failure."""
         every_s, zero, cells = REST_SHARE * self.drops_force_after_s, np.zeros(3), self._cells
         while not self._closed.wait(every_s) and cells[loop_cells.FAILED] == 0.0:
@@ -168,9 +168,9 @@ class ForceDimensionRig:
     def _error(self, code: int) -> DeviceError:
         """The error of a code; called in the thread that got the code, because the library keeps its last error per
         thread."""
-        return self._failure or self._fail(self._words(int(self._cells[loop_cells.FAILED]) or code))
+        return self._failure or self._fail(self._error_text(int(self._cells[loop_cells.FAILED]) or code))
 
-    def _words(self, code: int) -> str:
+    def _error_text(self, code: int) -> str:
         function = code - loop_cells.OF_LIBRARY
         if 0 <= function < len(loop_cells.LIBRARY):
             return f"The library says: {self._handle.library.last_error(loop_cells.LIBRARY[function])}"

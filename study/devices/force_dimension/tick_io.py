@@ -124,7 +124,7 @@ def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float
 
 
 @part
-def _wake(calls: Addresses, cells: FloatArray) -> int:
+def _wake_device(calls: Addresses, cells: FloatArray) -> int:
     """After a silence that was longer than the watchdog. In the middle of a force that is an end; with none it is
     not: the computer was asleep, or nothing was played."""
     code = check_on(calls, cells)
@@ -139,10 +139,10 @@ def _wake(calls: Addresses, cells: FloatArray) -> int:
 
 
 @part
-def _send(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     """Send a force. The caller must hold the lock."""
     if _is_silent(calls, cells):
-        code = _wake(calls, cells)
+        code = _wake_device(calls, cells)
         if code != 0:
             return code
     x, y, z = force[0], force[1], force[2]
@@ -159,7 +159,7 @@ def _send(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 
 @part
-def _zero(calls: Addresses, cells: FloatArray) -> int:
+def _send_zero(calls: Addresses, cells: FloatArray) -> int:
     if _set_force(calls, cells, 0.0, 0.0, 0.0) < 0:
         return record_library_failure(cells, FORCE)
     if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
@@ -180,7 +180,7 @@ def _write_zero(calls: Addresses, cells: FloatArray) -> int:
     if cells[LET_GO] != 0.0:
         return 0
     got = acquire(calls, LOCK_S)
-    code = _zero(calls, cells)
+    code = _send_zero(calls, cells)
     if got:
         release(calls)
     return code
@@ -202,7 +202,7 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
         return FAILED_BEFORE
     if not acquire(calls, LOCK_S):
         return record_failure(cells, LOCKED)
-    code = _send(calls, cells, force) if cells[CLOSED] == 0.0 else record_failure(cells, IS_CLOSED)
+    code = _send_force(calls, cells, force) if cells[CLOSED] == 0.0 else record_failure(cells, IS_CLOSED)
     release(calls)
     return code
 
@@ -221,7 +221,7 @@ def _entry_points(sources: int) -> tuple[Any, Any, Any]:
     @njit(WRITE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def send_once(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
         _ = sources
-        return _send(calls, cells, force)
+        return _send_force(calls, cells, force)
 
     return sense_once, write_once, send_once
 

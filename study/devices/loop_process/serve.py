@@ -63,7 +63,11 @@ class DeviceServer:
         tables: tuple[tuple[End, dict[str, Callable[..., Any]]], ...] = (
             (
                 work,
-                {"hold": device.hold, "release": device.release, "play": lambda commands: self._play(work, commands)},
+                {
+                    "hold": device.hold,
+                    "release": device.release,
+                    "play": lambda commands: self._play_commands(work, commands),
+                },
             ),
             (signs, {"keep_alive": device.keep_alive, "fault": device.fault, "health": device.health}),
             (look, {"look": device.look}),
@@ -99,7 +103,7 @@ class DeviceServer:
         finally:
             self.ended.set()
 
-    def _play(self, end: End, commands: Signal) -> Played:
+    def _play_commands(self, end: End, commands: Signal) -> Played:
         def go_on(share: float) -> None:
             end.send((PROGRESS, share))
             if not end.recv():

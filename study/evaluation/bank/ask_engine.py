@@ -143,7 +143,9 @@ def _engines(
     folder: ProofFolder, workers: int, left: SimpleQueue[str], answered: SimpleQueue[str]
 ) -> Iterator[list[threading.Thread]]:
     engines = [Engine(folder) for _ in range(workers)]
-    threads = [threading.Thread(target=_work, args=(each, folder, left, answered), daemon=True) for each in engines]
+    threads = [
+        threading.Thread(target=_run_worker, args=(each, folder, left, answered), daemon=True) for each in engines
+    ]
     for thread in threads:
         thread.start()
     try:
@@ -158,7 +160,7 @@ def _engines(
             engine.close()
 
 
-def _work(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
+def _run_worker(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
     while True:
         try:
             name = left.get_nowait()

@@ -71,7 +71,7 @@ def follow_up(
         on_done(done, len(names))
 
     ask_engine(again, names, workers, on_answered)
-    return tuple(_found(again, each, label) for each, label in zip(starts, labels, strict=True))
+    return tuple(_follow_up_outcome(again, each, label) for each, label in zip(starts, labels, strict=True))
 
 
 def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcome) -> None:
@@ -118,7 +118,7 @@ def _write_case(
     }
 
 
-def _found(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
+def _follow_up_outcome(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
     def read_follow_up(which: str) -> tuple[str, tuple[str, ...]]:
         if which not in label:
             return "", ()

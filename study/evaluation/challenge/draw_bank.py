@@ -93,7 +93,7 @@ def _effects(
     if kind == "nothing":
         return (), ()
     if kind == "pair":
-        return _pair(random), tuple(float(each) for each in random.uniform(lowest, 1.0, 2))
+        return _draw_pair(random), tuple(float(each) for each in random.uniform(lowest, 1.0, 2))
     names = tuple(DECOYS if kind == "outside" else second_engine.EFFECTS if bank == "engine" else EFFECTS)
     own = [seed, 3, sorted(LOWEST).index(kind), sorted(EXTRAS).index(bank)]
     order = np.random.default_rng(own).permutation(len(names))
@@ -103,7 +103,7 @@ def _effects(
     return (names[which],), (float(lowest + (1.0 - lowest) * share),)
 
 
-def _pair(random: np.random.Generator) -> tuple[str, str]:
+def _draw_pair(random: np.random.Generator) -> tuple[str, str]:
     while True:
         first, second = (str(name) for name in random.choice(list(EFFECTS), 2, replace=False))
         if not any({first, second} <= row for row in ONE_ROW):

@@ -82,7 +82,7 @@ def diagnose_folder(
             "Leave --seconds out: searches then end by a count of evaluations, the same on every machine.",
             saved="Nothing was written.",
         )
-    found = _found(plan)
+    found = _take_inventory(plan)
     time = clock or RealClock()
     kept = reusable_answers(plan.out, found.recordings, plan.seconds)
     _make_writable(plan.out)
@@ -99,7 +99,7 @@ def diagnose_folder(
         )
 
 
-def _found(plan: RealPlan) -> RealFolder:
+def _take_inventory(plan: RealPlan) -> RealFolder:
     """The inventory. Raises StudyError where there is nothing to diagnose, or no time for it."""
     if plan.seconds is not None and not math.isfinite(plan.seconds):
         raise WrongUseError(

@@ -96,7 +96,7 @@ def _contradictions(found: ImportMap) -> Iterator[str]:
         if channel.clock and channel.clock not in clocks:
             yield f"channel '{channel.name}' is on the clock '{channel.clock}', but there are {', '.join(clocks)}"
     yield from _roles(found)
-    yield from _holds(found)
+    yield from _check_hold(found)
     yield from _clock_contradictions(found)
     if found.part and any(clock.file for clock in found.clock):
         yield "clocks with `file` put files side by side, [[part]] one after another; a map does one or the other"
@@ -136,7 +136,7 @@ def _roles(found: ImportMap) -> Iterator[str]:
 _RESAMPLED = {"zero-order": "held", "linear": "linear", "band-limited": "band-limited"}
 
 
-def _holds(found: ImportMap) -> Iterator[str]:
+def _check_hold(found: ImportMap) -> Iterator[str]:
     """The interpolation of a command between samples is stated in two places, which must agree."""
     for channel in found.channel:
         says = {"held": "zero-order"}.get(channel.resample, channel.resample)

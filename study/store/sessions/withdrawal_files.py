@@ -53,8 +53,10 @@ def read_intent(data: Path, subject: str) -> WithdrawalIntent | None:
         return None
     try:
         left = read_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION)
-        sessions = {str(name): _parse_begun(begun) for name, begun in left["sessions"].items() if _of(name, subject)}
-        derived = tuple(str(name) for name in left["derived"] if _inside(str(name)))
+        sessions = {
+            str(name): _parse_begun(begun) for name, begun in left["sessions"].items() if _is_of_subject(name, subject)
+        }
+        derived = tuple(str(name) for name in left["derived"] if _is_plain_name(str(name)))
         return WithdrawalIntent(subject, str(left["withdrawn_utc"]), sessions, derived)
     except (StudyError, AttributeError, KeyError, TypeError):
         return None
@@ -106,12 +108,12 @@ def _parse_begun(left: Any) -> SessionParticipant | None:
         return None
 
 
-def _of(name: Any, subject: str) -> bool:
+def _is_of_subject(name: Any, subject: str) -> bool:
     match = FOLDER.fullmatch(str(name))
     return match is not None and match["subject"] == subject
 
 
-def _inside(name: str) -> bool:
+def _is_plain_name(name: str) -> bool:
     path = PurePosixPath(name)
     if not path.parts or path.is_absolute() or ".." in path.parts:
         return False

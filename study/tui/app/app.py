@@ -75,7 +75,7 @@ class HapteqApp(App[None]):
         return key_name(super().get_key_display(binding))
 
     async def on_mount(self) -> None:
-        leave_with_the_terminal(self, lambda: self._leave(ExitCode.INTERRUPTED))
+        leave_with_the_terminal(self, lambda: self._leave_app(ExitCode.INTERRUPTED))
         if self._start.first is not None:
             await self._sit(self._start.first)
         else:
@@ -148,20 +148,20 @@ class HapteqApp(App[None]):
                 case "home":
                     await self._archive.home()
                 case "quit":
-                    self._leave(ExitCode.DONE)
+                    self._leave_app(ExitCode.DONE)
 
         panel = OutcomeScreen(outcome)
         self.push_screen(panel, decided)
         self._keys.forget_earlier()
         return panel
 
-    def _leave(self, code: ExitCode) -> None:
+    def _leave_app(self, code: ExitCode) -> None:
         self.exit(return_code=int(code))
 
     def action_let_go(self) -> None:
         """Ctrl-C. First press: force off, and a panel. Second press: leave."""
         if self._sitting is None or self._letting_go is not None:
-            self._leave(ExitCode.INTERRUPTED)
+            self._leave_app(ExitCode.INTERRUPTED)
             return
         self._engine.send(LetGo())
         panel = self._letting_go = self._panel(outcomes.stop_told_panel(self._words), "")
@@ -176,7 +176,7 @@ class HapteqApp(App[None]):
         if self._sitting is not None:
             self.action_let_go()
         else:
-            self._leave(ExitCode.DONE)
+            self._leave_app(ExitCode.DONE)
 
     def action_help(self) -> None:
         from study.tui.screens.help import HelpScreen

@@ -85,7 +85,7 @@ class Engine:
         except Exception as bug:  # noqa: BLE001 - the screen must say it, and the device is closed
             self._busy = False
             traceback.print_exc()
-            self._fail(_bug(bug), ExitCode.ERROR)
+            self._fail(_bug_error(bug), ExitCode.ERROR)
         finally:
             self._busy = False
 
@@ -124,7 +124,7 @@ def _end_by_force() -> None:
     os._exit(1)
 
 
-def _bug(bug: Exception) -> StudyError:
+def _bug_error(bug: Exception) -> StudyError:
     return StudyError(
         "Something in hapteq went wrong",
         f"{type(bug).__name__}: {bug}.",

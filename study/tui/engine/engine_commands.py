@@ -109,7 +109,7 @@ class EngineCommands:
         for note in plan.notes:
             self._link.send(Trouble(note))
         words = words_of(plan.session.protocol)
-        self._sit(words, lambda participant: conduct_new(plan.session, order.device, participant))
+        self._conduct_sitting(words, lambda participant: conduct_new(plan.session, order.device, participant))
 
     def _resume(self, command: Resume) -> None:
         folder = find_session(command.session, Path(command.data))
@@ -130,9 +130,9 @@ class EngineCommands:
             self._link.send(Finished(str(folder.path), folded.state.answers, _results(written)))
             return
         words = words_of(folded.state.protocol)
-        self._sit(words, lambda participant: conduct_resumed(folder, command.device, participant))
+        self._conduct_sitting(words, lambda participant: conduct_resumed(folder, command.device, participant))
 
-    def _sit(self, words: Words, conduct: Callable[[Participant], ConductedSitting]) -> None:
+    def _conduct_sitting(self, words: Words, conduct: Callable[[Participant], ConductedSitting]) -> None:
         self._link.send(ParticipantWords(words))
         self._link.send(Preparing(words["preparing_device"]))
         with self._participant() as participant:
@@ -150,11 +150,11 @@ class EngineCommands:
         self._link.forget_replies()
         display = RemoteDisplay(self._link, self._clock)
         try:
-            yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._hear)
+            yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._report_requests)
         finally:
             self._link.stop_device = None
 
-    def _hear(self, folder: SessionFolder, device: Device) -> None:
+    def _report_requests(self, folder: SessionFolder, device: Device) -> None:
         self.opened = folder
         self._link.stop_device = device.stop
         self._link.send(Opened(folder.name, str(folder.path)))

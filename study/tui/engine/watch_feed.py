@@ -82,12 +82,12 @@ def feed(descriptor: int, session_path: str) -> None:
             view = follower.look(clock.utc())
         except StudyError as error:
             view = None
-            _send(connection, f"{error.happened} {error.do_now}")
-        if view is not None and not _send(connection, view):
+            _send_view(connection, f"{error.happened} {error.do_now}")
+        if view is not None and not _send_view(connection, view):
             return
 
 
-def _send(connection: Connection, what: WatchView | str) -> bool:
+def _send_view(connection: Connection, what: WatchView | str) -> bool:
     try:
         connection.send(what)
     except OSError:

@@ -23,7 +23,7 @@ def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_li
     """Ask which direction of which vibration to play. Raises KeyboardInterrupt when the participant leaves."""
     talk.forget()
     vibration = menu.vibration
-    talk.say("", _place(menu, vibration, talk.words))
+    talk.say("", _place_text(menu, vibration, talk.words))
     while True:
         talk.prompt(talk.words.fill("line_demo_prompt", {"keys": keys.choice(talk.words)}))
         line = talk.wait(sign_of_life)
@@ -87,10 +87,10 @@ def _step_vibration(menu: DemoMenu, vibration: int, step: int, words: Words) -> 
         return vibration, words["line_demo_first"]
     if turned > menu.vibrations:
         return vibration, words["line_demo_last"]
-    return turned, _place(menu, turned, words)
+    return turned, _place_text(menu, turned, words)
 
 
-def _place(menu: DemoMenu, vibration: int, words: Words) -> str:
+def _place_text(menu: DemoMenu, vibration: int, words: Words) -> str:
     place = words.fill("line_demo_place", {"vibration": vibration, "vibrations": menu.vibrations})
     moves = "" if menu.handle_moves else f" {words['simulation']}"
     return f"{place} {felt_so_far(menu, vibration, words)}{moves}"

@@ -69,26 +69,26 @@ class BrowseScreen(ModalScreen[None]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._say(f"{LOG}: a session. {DIAGNOSIS}: a diagnosis.")
+        self._show_message(f"{LOG}: a session. {DIAGNOSIS}: a diagnosis.")
         self.query_one(HapteqFiles).focus()
 
     @on(Input.Submitted, "#path")
-    def _go(self, typed: Input.Submitted) -> None:
+    def _go_to_path(self, typed: Input.Submitted) -> None:
         path = Path(typed.value).expanduser()
         if path.is_dir() and (path / LOG).exists():
-            self._open(path / LOG)
+            self._open_path(path / LOG)
         elif path.is_dir():
             tree = self.query_one(HapteqFiles)
             tree.path = path
             tree.focus()
         elif path.is_file():
-            self._open(path)
+            self._open_path(path)
         else:
-            self._say(f"There is nothing at {path}.")
+            self._show_message(f"There is nothing at {path}.")
 
     @on(DirectoryTree.FileSelected)
     def _open_selected(self, selected: DirectoryTree.FileSelected) -> None:
-        self._open(selected.path)
+        self._open_path(selected.path)
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(HELP))
@@ -96,10 +96,10 @@ class BrowseScreen(ModalScreen[None]):
     def action_leave(self) -> None:
         dismiss_screen(self, None)
 
-    def _open(self, path: Path) -> None:
+    def _open_path(self, path: Path) -> None:
         wanted = SessionWanted(str(path.parent)) if path.name == LOG else DiagnosisWanted(str(path))
         self.app.post_message(wanted)
         dismiss_screen(self, None)
 
-    def _say(self, text: str) -> None:
+    def _show_message(self, text: str) -> None:
         self.query_one("#message", Static).update(text)

@@ -85,7 +85,7 @@ class DiagnoseForm(ModalScreen[None]):
             try:
                 named[field] = tuple(str(Path(word).expanduser()) for word in shlex.split(self._text_of(field)))
             except ValueError:
-                self._say("A quotation mark is open.", field)
+                self._show_message("A quotation mark is open.", field)
                 return
         sources = named["sources"]
         model, out = (
@@ -93,11 +93,11 @@ class DiagnoseForm(ModalScreen[None]):
         )
         missing = next(((f, path) for f, paths in named.items() for path in paths if not Path(path).exists()), None)
         if not sources:
-            self._say("Name a recording, or the folder of a session.", "sources")
+            self._show_message("Name a recording, or the folder of a session.", "sources")
         elif missing is not None:
-            self._say(f"There is nothing at {missing[1]}.", missing[0])
+            self._show_message(f"There is nothing at {missing[1]}.", missing[0])
         elif model and not Path(model).is_file():
-            self._say(f"There is no file {model}.", "model")
+            self._show_message(f"There is no file {model}.", "model")
         elif self.is_active:
             self.app.post_message(DiagnoseWanted(sources, model, out, named["clean"]))
             dismiss_screen(self, None)
@@ -111,6 +111,6 @@ class DiagnoseForm(ModalScreen[None]):
     def _text_of(self, name: str) -> str:
         return self.query_one(f"#{name}", Input).value.strip()
 
-    def _say(self, text: str, field: str) -> None:
+    def _show_message(self, text: str, field: str) -> None:
         self.query_one("#message", Static).update(text)
         self.query_one(f"#{field}", Input).focus()

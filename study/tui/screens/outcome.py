@@ -94,7 +94,7 @@ class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
             return
         self.set_class(not outcome.grave, "-good")
         self.query_one(Vertical).border_title = f"{'! ' if outcome.grave else ''}{outcome.title}"
-        self.query_one("#told", Static).update(_told(outcome))
+        self.query_one("#told", Static).update(_outcome_text(outcome))
         keys = [(key, self.words.key(words)) for key, words in map(KEYS.__getitem__, outcome.decisions)]
         self.query_one("#offered", Static).update("\n".join(f"{key.capitalize():5}  {words}" for key, words in keys))
         self.refresh_bindings()
@@ -112,6 +112,6 @@ class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
         dismiss_screen(self, decision)
 
 
-def _told(outcome: Outcome) -> Content:
+def _outcome_text(outcome: Outcome) -> Content:
     parts = [Content.assemble((heading, "bold"), "\n" if heading else "", text) for heading, text in outcome.parts]
     return Content("\n\n").join(parts)

@@ -54,22 +54,22 @@ class RestScreen(TranslatedScreen[float]):
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         # Until the rest is over Enter does nothing, so the footer does not name it.
-        return action != "go_on" or self._over()
+        return action != "go_on" or self._is_over()
 
     def action_go_on(self) -> None:
-        if self._over():
+        if self._is_over():
             dismiss_screen(self, self._seconds_rested())
 
     def _tick(self) -> None:
         left_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))
         self.query_one(Digits).update(f"{left_s // 60}:{left_s % 60:02d}")
-        self.query_one("#message", LiteralText).update(self.words["rest_ready" if self._over() else "rest_resting"])
-        if self._over():
+        self.query_one("#message", LiteralText).update(self.words["rest_ready" if self._is_over() else "rest_resting"])
+        if self._is_over():
             self._ticking.stop()
             self.refresh_bindings()
 
     def _seconds_rested(self) -> float:
         return time.monotonic() - self._began_s
 
-    def _over(self) -> bool:
+    def _is_over(self) -> bool:
         return self._seconds_rested() >= self._notice.seconds

@@ -65,7 +65,7 @@ def level_history(
     for start, end in itertools.pairwise(dots):
         canvas.line(start, end)
     marks: dict[tuple[int, int], str] = {}
-    for (x, y), mark in zip(dots, [*map(_mark, points), NEXT], strict=False):
+    for (x, y), mark in zip(dots, [*map(_point_mark, points), NEXT], strict=False):
         cell = (round(y) // 4, round(x) // 2)
         if cell not in marks or _FIRST[mark] >= _FIRST[marks[cell]]:
             marks[cell] = mark
@@ -77,7 +77,7 @@ def level_history(
     return Content("\n").join([*lines, legend])
 
 
-def _mark(point: StaircasePoint) -> str:
+def _point_mark(point: StaircasePoint) -> str:
     """A reversal after a right answer is a peak, after a wrong one a valley."""
     if point.reversal:
         return PEAK if point.correct else VALLEY

@@ -80,9 +80,9 @@ class DirectionPanel(Widget):
 
     def _lines(self) -> list[str]:
         """The words in as many lines as they need, for a cut word may be the one that tells the directions apart."""
-        return textwrap.wrap(self._words(), max(1, self.size.width), break_on_hyphens=False) or [""]
+        return textwrap.wrap(self._direction_text(), max(1, self.size.width), break_on_hyphens=False) or [""]
 
-    def _words(self) -> str:
+    def _direction_text(self) -> str:
         if self.picture is None:
             return self._texts["interval_first" if self.number == 1 else "interval_second"]
         return sentence(self.picture, self.number, self._texts)

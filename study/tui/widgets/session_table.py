@@ -69,7 +69,7 @@ class SessionTable(DataTable[Content | str]):
         for title, width in self._widths.items():
             self.add_column(title, width=width)
         self._add_more(lines, chosen.name if chosen is not None else "")
-        self._tell()
+        self._post_looked()
 
     def on_resize(self, event: Resize) -> None:
         if self._lines and event.size.width != self._fitted_to:
@@ -112,7 +112,7 @@ class SessionTable(DataTable[Content | str]):
         return self._lines[self.cursor_row] if 0 <= self.cursor_row < len(self._lines) else None
 
     def on_data_table_row_highlighted(self) -> None:
-        self._tell()
+        self._post_looked()
 
     def on_data_table_row_selected(self) -> None:
         if self._chosen is not None:
@@ -131,7 +131,7 @@ class SessionTable(DataTable[Content | str]):
         wanted = {"resume": "unfinished", "watch": "running"}.get(action)
         return wanted is None or (self._chosen is not None and self._chosen.standing == wanted)
 
-    def _tell(self) -> None:
+    def _post_looked(self) -> None:
         self.refresh_bindings()
         if self._chosen is not None:
             self.post_message(self.Looked(self._chosen))

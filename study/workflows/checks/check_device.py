@@ -57,11 +57,11 @@ def check_device(
         sensors = (*sensors, _accelerometer(answered) if info.has_sensor else _no_accelerometer())
     largest = _largest_force(info, total_cap_n)
     made_of = (DeviceFinding("Force on a hand", forces_in_words(safety), fine=True),) if safety is not None else ()
-    findings = (_kind(info), _answers(len(answered)), *sensors, _rate(info), largest, *made_of)
+    findings = (_check_kind(info), _answers(len(answered)), *sensors, _rate(info), largest, *made_of)
     return DeviceReport(info.name, info.simulated, findings)
 
 
-def _kind(info: DeviceInfo) -> DeviceFinding:
+def _check_kind(info: DeviceInfo) -> DeviceFinding:
     kind = "simulated: no handle moves" if info.simulated else "a real device"
     return DeviceFinding("Device", f"{info.name} ({kind})", fine=True)
 

@@ -61,7 +61,7 @@ def record_baseline(name: str, moving: MotionCallbacks) -> tuple[str, str]:
     """Record the baseline of the daily checks. Returns its name in `device_folder` and its SHA-256. Raises StudyError,
     also where the recording is not good enough for a comparison."""
     plan = _plan(name, BASELINES)
-    with contextlib.closing(_open(plan)) as device:
+    with contextlib.closing(_open_free_device(plan)) as device:
         return _baseline_on(device, plan, moving)
 
 
@@ -94,7 +94,7 @@ def require_real(name: str) -> None:
 def check_today(name: str, moving: MotionCallbacks) -> CheckedToday:
     """Play the excitation of the baseline and write what changed. Raises StudyError."""
     plan = _plan(name, CHECKS)
-    with contextlib.closing(_open(plan)) as device:
+    with contextlib.closing(_open_free_device(plan)) as device:
         return check_on(device, plan, moving)
 
 
@@ -242,7 +242,7 @@ def _moment() -> str:
     return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
 
 
-def _open(plan: RecordingPlan) -> Device:
+def _open_free_device(plan: RecordingPlan) -> Device:
     return open_device(plan.device, recording_settings(plan), RealClock(), plan.seed)
 
 

@@ -124,7 +124,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     _check_compared(plan, found, held)
     settings = replace(_settings(plan, found, clean, first.balances), time_left=time_left, guard=guard)
     try:
-        findings = engine(found.recordings, held, settings, map_forked, _within(on_progress, begun, DIAGNOSED))
+        findings = engine(found.recordings, held, settings, map_forked, _scale_progress(on_progress, begun, DIAGNOSED))
     except NothingLearned as refusal:
         raise not_diagnosable_error(
             (str(refusal),), "Leave --clean out, or record the device in order in the same way."
@@ -235,7 +235,7 @@ def _model(
     bounds: tuple[TimeBudget, Guard],
     on_progress: Progress,
 ) -> FirstModel:
-    within = _within(on_progress, READ, FITTED)
+    within = _scale_progress(on_progress, READ, FITTED)
     if plan.model is not None:
         return FirstModel(read_given_model(plan.model, found), ())
     if found.simulated:
@@ -260,7 +260,7 @@ def _twin(on_progress: Progress) -> MechanicalModel:
         return write_twin(plan, lambda share: on_progress(what, share)).model
 
 
-def _within(on_progress: Progress, begin: float, end: float) -> Callable[[str, float], None]:
+def _scale_progress(on_progress: Progress, begin: float, end: float) -> Callable[[str, float], None]:
     return lambda what, share: on_progress(what, begin + (end - begin) * min(max(share, 0.0), 1.0))
 
 

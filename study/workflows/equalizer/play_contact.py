@@ -116,7 +116,7 @@ def play_contact(
     except ValueError as problem:
         raise _refusal(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
     tracked = start.basis.forces(normal)
-    wanted = _along(recording, normal, len(tracked))
+    wanted = _along_normal(recording, normal, len(tracked))
     forces = (
         _within_cap(_fade_out(_beside_spring(tracked, wanted, models), rate_hz), plan, rate_hz),
         _within_cap(_plain_forces(model, wanted), plan, rate_hz),
@@ -155,7 +155,7 @@ def _transient(plan: ContactPlan) -> Trajectory:
     return found
 
 
-def _along(recording: FloatArray, normal: FloatArray, rows: int) -> FloatArray:
+def _along_normal(recording: FloatArray, normal: FloatArray, rows: int) -> FloatArray:
     return np.outer(np.pad(recording, (0, rows - len(recording))), normal)
 
 
@@ -214,7 +214,7 @@ def _play_both(
         try:
             announce_motion(device, plan.cap_n, total_s, before_moving)
             for each in forces:
-                measured.append(_play(device, each, advance))
+                measured.append(_play_transient(device, each, advance))
         except KeyboardInterrupt as interruption:
             if device.fault() is Fault.FORCE_LEFT:
                 raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, AGAIN, NOTHING) from None
@@ -231,7 +231,7 @@ def _settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[FloatArra
     return replace(settings, limits=replace(settings.limits, slew_n_per_s=slew_n_per_s))
 
 
-def _play(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
+def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
     """(N, 3), m/s^2, of the rows of the forces."""
     settle = round(SETTLE_S * device.info.sample_rate_hz)
     padded = np.pad(forces, ((settle, settle), (0, 0)))

@@ -85,35 +85,37 @@ def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: f
         )
     models = tuple(_readable(path) for path in paths)
     if len(models) == 1:
-        return _one(paths, models[0], at_m)
+        return _single_model(paths, models[0], at_m)
     if _of_one_place(models):
         return _two_bands(paths, models, at_m)
     try:
         return _several_places(paths, WorkspaceModels(models), at_m, weight)
     except WorkspaceError as problem:
         numbered = ", ".join(f"{number}: {path.name}" for number, path in enumerate(paths, start=1))
-        raise _unfit(f"{_sentence(str(problem))} Models are {numbered}.", "Give models that go together.") from problem
+        raise _unfit_error(
+            f"{_sentence(str(problem))} Models are {numbered}.", "Give models that go together."
+        ) from problem
 
 
-def _one(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> PlaybackModels:
+def _single_model(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> PlaybackModels:
     at = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
     return PlaybackModels((model,), at, None, None, _far(paths[0], model, at_m), (), _sha256(paths))
 
 
 def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None) -> PlaybackModels:
     if len(models) > 2:
-        raise _unfit(
+        raise _unfit_error(
             f"{len(models)} models are of one place.", "Give one of them, or a narrow and a wide one for bands."
         )
     narrow, wide = sorted(models, key=lambda model: model.band_hz[1])
     if narrow.sample_rate_hz != wide.sample_rate_hz:
-        raise _unfit(
+        raise _unfit_error(
             f"They run at {narrow.sample_rate_hz:g} and {wide.sample_rate_hz:g} Hz.", "Identify both at one rate."
         )
     try:
         two = TwoModels(narrow, wide)
     except ValueError as problem:
-        raise _unfit(
+        raise _unfit_error(
             f"Both models are of one place, but {problem}.",
             "Give one of them, or identify both alike (with or without --with-spring), such as --band 5 35 and "
             "--band 5 400 --order 40.",
@@ -161,19 +163,19 @@ def _readable(path: Path) -> IdentifiedModel:
     model = read_identified_model(path)
     in_order = all(_in_order(names) for names in (model.input_channels, model.output_channels))
     if not in_order or (model.input_unit, model.output_unit) != (FORCES.unit, TRAJECTORY.unit):
-        raise _unfit(
+        raise _unfit_error(
             f"{path.name} goes from {', '.join(model.input_channels)} in {model.input_unit} to "
             f"{', '.join(model.output_channels)} in {model.output_unit}; a table needs a model from fx, fy, fz in N to "
             "ax, ay, az in m/s^2, in this order.",
             "Identify one from recordings of all three axes, with channel names that end in x, y and z.",
         )
     if model.spectral_radius >= 1:
-        raise _unfit(
+        raise _unfit_error(
             f"The model in {path.name} is not stable (slowest pole {model.spectral_radius:.5f}).",
             "Identify it again with hapteq identify, which makes stable ones only.",
         )
     if not (gain := peak_gain(model)) <= HIGHEST_GAIN:
-        raise _unfit(
+        raise _unfit_error(
             f"By {path.name} 1 N accelerates the handle with up to {gain:.2g} m/s^2; a model is taken up to "
             f"{HIGHEST_GAIN:g} m/s^2.",
             "Check the units of the recording that it was made from, and identify it again.",
@@ -233,5 +235,5 @@ def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
-def _unfit(happened: str, do_now: str) -> StudyError:
+def _unfit_error(happened: str, do_now: str) -> StudyError:
     return StudyError("These models cannot equalize the table", happened, do_now, saved="Nothing was written.")

@@ -58,7 +58,7 @@ def play_pieces(
     for piece in pieces(protocol, device.info.sample_rate_hz):
         length_s, started_s = piece.commands.duration_s, before_s
         same = (piece.number, piece.frequency_hz)
-        take = _take(
+        take = _play_until_clean(
             protocol,
             device,
             piece,
@@ -71,7 +71,7 @@ def play_pieces(
         on_progress(before_s)
 
 
-def _take(
+def _play_until_clean(
     protocol: RecordingProtocol, device: Device, piece: Piece, share: float, on_share: Callable[[float], None]
 ) -> PlayedPiece:
     """The first clean take, or the last one."""
@@ -80,7 +80,7 @@ def _take(
     amplitude_n, sensor_before, total_before = share * requested_n, 0, 0
     for tries in range(1, MOST_TRIES + 1):
         played = piece if amplitude_n == requested_n else piece.at(amplitude_n)
-        recording, health = _once(device, played, on_share)
+        recording, health = _play_once(device, played, on_share)
         last = tries == MOST_TRIES or amplitude_n <= least_n or not protocol.lower_on_clip
         if last or not is_clipped(health):
             break
@@ -90,7 +90,7 @@ def _take(
     return PlayedPiece(played, requested_n, tries, sensor_before, total_before, recording, health)
 
 
-def _once(device: Device, piece: Piece, on_share: Callable[[float], None]) -> tuple[Recording, Health]:
+def _play_once(device: Device, piece: Piece, on_share: Callable[[float], None]) -> tuple[Recording, Health]:
     played = device.play(piece.commands, on_share)
     if played.recording is None or played.health.fault is not Fault.NONE:
         raise DeviceError(

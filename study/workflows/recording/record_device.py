@@ -83,7 +83,7 @@ def record_on(
         _write_whole_pieces(plan, device, done)
         if device.fault() is Fault.FORCE_LEFT:
             raise _still_on(plan, len(done)) from interruption
-        raise _left(plan, len(done)) from interruption
+        raise _interrupted_error(plan, len(done)) from interruption
     except DeviceError as error:
         _write_whole_pieces(plan, device, done)
         error.saved = _saved_words(plan, len(done))
@@ -96,7 +96,7 @@ def check_free(out: Path) -> None:
     require_free(out, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
-def _left(plan: RecordingPlan, done: int) -> UserInterruptError:
+def _interrupted_error(plan: RecordingPlan, done: int) -> UserInterruptError:
     all_pieces = len(pieces(plan.protocol, NOMINAL_RATE_HZ))
     return UserInterruptError(
         "Interrupted",

@@ -41,7 +41,7 @@ def segment_facts(take: PlayedPiece) -> dict[str, Any]:
 
 def warnings_of(take: PlayedPiece) -> list[str]:
     """Warnings for the person who recorded."""
-    health, what = take.health, _what(take)
+    health, what = take.health, _piece_text(take)
     found = []
     if take.played_n < take.requested_n:
         found.append(_reduction_warning(take))
@@ -65,7 +65,7 @@ def _sensor_warning(sensor: SensorFacts, what: str) -> str:
     return f"{packets} ({what}); at {sensor.unplaced_ticks} of {sensor.ticks} ticks its acceleration is NaN."
 
 
-def _what(take: PlayedPiece) -> str:
+def _piece_text(take: PlayedPiece) -> str:
     piece = take.piece
     kind = f"{piece.frequency_hz:g} Hz" if piece.frequency_hz else piece.segment.kind
     return f"{kind} along {direction_text(piece)}"
@@ -78,4 +78,4 @@ def _reduction_warning(take: PlayedPiece) -> str:
     if take.total_clipped_before:
         why.append(f"the force was at its cap for {take.total_clipped_before} ticks")
     reason = " and ".join(why) if why else "as before"
-    return f"Played at {take.played_n:.3g} N instead of {take.requested_n:.3g} N ({_what(take)}): {reason}."
+    return f"Played at {take.played_n:.3g} N instead of {take.requested_n:.3g} N ({_piece_text(take)}): {reason}."

@@ -56,7 +56,7 @@ def begun_in(folder: SessionFolder) -> SessionParticipant | None:
         name = tomllib.loads(opening.protocol_text).get("name", "")
     except (StudyError, OSError, TypeError, ValueError, RecursionError):
         return _begun_in_damaged(folder)
-    return SessionParticipant(name, opening.observer is not None, _place(folder, opening))
+    return SessionParticipant(name, opening.observer is not None, _read_place(folder, opening))
 
 
 def _begun_in_damaged(folder: SessionFolder) -> SessionParticipant | None:
@@ -73,7 +73,7 @@ def _begun_in_damaged(folder: SessionFolder) -> SessionParticipant | None:
     return SessionParticipant(name[1].decode(errors="replace"), OF_A_PERSON not in opening, int(numbers[-1]))
 
 
-def _place(folder: SessionFolder, opening: SessionOpened) -> int | None:
+def _read_place(folder: SessionFolder, opening: SessionOpened) -> int | None:
     """Read the place from the lines before the first trial, so that a long log is not read completely."""
     if not place_comes_later(opening):
         return opening.participant_number

@@ -88,7 +88,7 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
     try:
         with ExitStack() as held, open_folder(data) as place:
             for folder in folders:
-                _hold(folder, held)
+                _lock_for_erasing(folder, held)
             earlier = read_intent(data, subject)
             begun = {folder.name: begun_in(folder) for folder in folders}
             since = earlier.withdrawn_utc if earlier else utc
@@ -112,7 +112,7 @@ def copies_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
     return (*(f"Written with --out, and not erased: {path}" for path in named), ELSEWHERE)
 
 
-def _hold(folder: SessionFolder, held: ExitStack) -> None:
+def _lock_for_erasing(folder: SessionFolder, held: ExitStack) -> None:
     """Lock the session while it is erased. A link in its place is not followed."""
     if not is_real_folder(folder.path):
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)

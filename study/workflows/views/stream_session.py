@@ -108,7 +108,7 @@ def stream_session(
                 outlet.push(_text({"event": "signals_lost", "ticks": lost}), outlet.clock_s())
             for line in follower.lines():
                 fact = _fact(line)
-                _send(fact, outlet, offset_s, now_s(), on_marker)
+                _send_fact(fact, outlet, offset_s, now_s(), on_marker)
                 sent += 1
                 if fact.get("event") == LAST:
                     return sent
@@ -135,7 +135,7 @@ def _fact(line: bytes) -> dict[str, Any]:
     return fact
 
 
-def _send(
+def _send_fact(
     fact: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
 ) -> None:
     fields = {name: fact[name] for name in TOLD if fact.get(name) is not None}

@@ -48,11 +48,11 @@ class SignalStreams:
         """Send the ticks since the last call; offset_s: LSL's clock less the session's. How many ticks were lost."""
         lost = self._push_new(offset_s)
         if self._calls % LOOK_EVERY == 0:
-            self._look()
+            self._push_new_rows()
         self._calls += 1
         return lost
 
-    def _look(self) -> None:
+    def _push_new_rows(self) -> None:
         live = read_live(self._folder)
         if live is None or live.telemetry == self._path:
             return

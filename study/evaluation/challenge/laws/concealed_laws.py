@@ -50,21 +50,21 @@ class LawKind:
     """For commands or readings: change for k = 1, from own axis, other axis, a and b."""
 
 
-def _either(random: Random, simple: tuple[float, ...], low: float, high: float) -> float:
+def _draw_simple_or_any(random: Random, simple: tuple[float, ...], low: float, high: float) -> float:
     """Draw, with equal probability, one of the simple numbers or any number in the range."""
     return float(random.choice(simple)) if random.random() < 0.5 else float(random.uniform(low, high))
 
 
-def _none(random: Random, sizes: Sizes) -> tuple[float, float]:
+def _no_parameters(random: Random, sizes: Sizes) -> tuple[float, float]:
     return 0.0, 0.0
 
 
 def _speed_power(random: Random, sizes: Sizes) -> tuple[float, float]:
-    return _either(random, (1.5, 3.0), 1.3, 3.2), 0.0
+    return _draw_simple_or_any(random, (1.5, 3.0), 1.3, 3.2), 0.0
 
 
 def _place_power(random: Random, sizes: Sizes) -> tuple[float, float]:
-    return _either(random, (1.5, 2.0, 5.0), 1.4, 4.0), 0.0
+    return _draw_simple_or_any(random, (1.5, 2.0, 5.0), 1.4, 4.0), 0.0
 
 
 def _low_power(random: Random, sizes: Sizes) -> tuple[float, float]:
@@ -87,7 +87,7 @@ def _quick(random: Random, sizes: Sizes) -> tuple[float, float]:
     return float(np.exp(random.uniform(np.log(0.008), np.log(0.4)))), 0.0
 
 
-def _slow(random: Random, sizes: Sizes) -> tuple[float, float]:
+def _draw_slow(random: Random, sizes: Sizes) -> tuple[float, float]:
     return random.uniform(0.4, 4.0), 0.0
 
 
@@ -123,28 +123,28 @@ LAW_KINDS: tuple[LawKind, ...] = (
     _force("pumped stiffness", "-k x sin(2 pi a t + b)", kernel.PUMPED, _pump, "t x"),
     _force("attraction", "s k (1 / (a - s x)^b - 1 / a^b)", kernel.ATTRACTION, _magnet, "x"),
     _force("relaxation", "-k (x - lag(x, a))", kernel.RELAXATION, _quick, "x", "vx", memory=True),
-    _force("heating gain", "-k u lag(u^2, a)", kernel.HEATING, _slow, "fx", memory=True),
+    _force("heating gain", "-k u lag(u^2, a)", kernel.HEATING, _draw_slow, "fx", memory=True),
     _force("soft drag", "-k tanh(v / a)", kernel.SOFT_DRAG, _part_of_speed, "vx"),
     _force("soft spring", "-k atan(x / a)", kernel.SOFT_SPRING, _part_of_travel, "x"),
     _force("fading drag", "-k v / (1 + (v / a)^2)", kernel.FADING_DRAG, _part_of_speed, "vx"),
     _force("contact on one side", "-s k max(s x - a, 0)^b", kernel.CONTACT, _part_of_travel, "x"),
     _force("drag beyond a place", "-k v where s x > a", kernel.EDGE_DRAG, _part_of_travel, "x vx"),
-    _force("square of another axis", "-s k y^2", kernel.CROSS_SQUARE, _none, "y", axes=2),
-    _force("spring that another axis stiffens", "-k x y^2", kernel.CROSS_SPRING, _none, "x y", axes=2),
-    _force("drag that another axis makes", "-k vx |vy|", kernel.CROSS_DRAG, _none, "vx vy", axes=2),
-    _force("gyroscopic", "s k vy, on the other -s k vx", kernel.WHIRL, _none, "vy", axes=2, both=True),
-    _force("drag along the path", "-k |v| v of both axes", kernel.ALL_DRAG, _none, "vx vy", axes=2, both=True),
+    _force("square of another axis", "-s k y^2", kernel.CROSS_SQUARE, _no_parameters, "y", axes=2),
+    _force("spring that another axis stiffens", "-k x y^2", kernel.CROSS_SPRING, _no_parameters, "x y", axes=2),
+    _force("drag that another axis makes", "-k vx |vy|", kernel.CROSS_DRAG, _no_parameters, "vx vy", axes=2),
+    _force("gyroscopic", "s k vy, on the other -s k vx", kernel.WHIRL, _no_parameters, "vy", axes=2, both=True),
+    _force("drag along the path", "-k |v| v of both axes", kernel.ALL_DRAG, _no_parameters, "vx vy", axes=2, both=True),
     LawKind("soft amplifier", "a tanh(u / a)", _part_of_force, ("fx",), acts_on=("command", "force"),
             change=lambda u, other, a, b: a * np.tanh(u / a) - u),
-    LawKind("amplifier of two gains", "u + s k |u|", _none, ("fx",), acts_on=("command", "force"),
+    LawKind("amplifier of two gains", "u + s k |u|", _no_parameters, ("fx",), acts_on=("command", "force"),
             change=lambda u, other, a, b: np.abs(u)),
-    LawKind("bent amplifier", "u + s k u |u|", _none, ("fx",), acts_on=("command", "force"),
+    LawKind("bent amplifier", "u + s k u |u|", _no_parameters, ("fx",), acts_on=("command", "force"),
             change=lambda u, other, a, b: u * np.abs(u)),
-    LawKind("crooked sensor", "r + s k r^2", _none, ("ax",), acts_on=("response",),
+    LawKind("crooked sensor", "r + s k r^2", _no_parameters, ("ax",), acts_on=("response",),
             change=lambda r, other, a, b: r * r),
     LawKind("soft sensor", "a atan(r / a)", _part_of_reading, ("ax",), acts_on=("response",),
             change=lambda r, other, a, b: a * np.arctan(r / a) - r),
-    LawKind("sensor of two axes", "rx + s k rx ry", _none, ("ax ay",), acts_on=("response",), axes=2,
+    LawKind("sensor of two axes", "rx + s k rx ry", _no_parameters, ("ax ay",), acts_on=("response",), axes=2,
             change=lambda r, other, a, b: r * other),
 )  # fmt: skip
 LAW_OF_NAME = {kind.name: kind for kind in LAW_KINDS}

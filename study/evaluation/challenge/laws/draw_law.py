@@ -113,8 +113,8 @@ def law_case(each: LawDraw, name: str) -> LawCase:
     model = as_model(name, known, tolerance, rig.axes)
     recording = make_recording(name, plan, response, position, rig)
     both = tuple((part.acceleration, part.position) for part in (free, moved))
-    case = Case(recording, model, (), _never, visibility(bare, device, (both[0], both[1]), rig))
-    return LawCase(case, truth, tuple(_fresh(device, rig, random, level) for level in (FRESH_N, LOUD_N)))
+    case = Case(recording, model, (), _refuse_further, visibility(bare, device, (both[0], both[1]), rig))
+    return LawCase(case, truth, tuple(_make_fresh(device, rig, random, level) for level in (FRESH_N, LOUD_N)))
 
 
 def _lawful(
@@ -137,11 +137,11 @@ def _lawful(
     raise ValueError(f"the device runs away with the law '{each.concealed}', seed {each.seed}")
 
 
-def _never(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+def _refuse_further(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
     raise ValueError("a device with a law is not recorded again")
 
 
-def _fresh(device: Device, rig: Rig, random: np.random.Generator, level_n: float) -> Fresh:
+def _make_fresh(device: Device, rig: Rig, random: np.random.Generator, level_n: float) -> Fresh:
     command = np.zeros((FRESH_PERIOD * FRESH_PERIODS, 3))
     for axis in rig.axes:
         command[:, axis] = np.tile(multisine(random, level_n / len(rig.axes) ** 0.5, FRESH_PERIOD), FRESH_PERIODS)

@@ -169,7 +169,7 @@ class ScriptedRig:
 def played(rigs, monkeypatch):
     """What a drive told whose thread does nothing: the test takes its place."""
     ended = threading.Event()
-    monkeypatch.setattr(RealtimeDrive, "_attend", lambda self: ended.wait())
+    monkeypatch.setattr(RealtimeDrive, "_run_ticks", lambda self: ended.wait())
 
     def play(clock: ScriptedTime, fails_at: int, compiled: bool) -> tuple:
         rig = ScriptedRig(rigs, clock, fails_at)

@@ -166,7 +166,7 @@ def test_from_the_acceptance_to_the_first_day_at_the_command_line(device_like, m
 
     monkeypatch.setattr(examine_setup, "examine_setup", fine_setup)
     monkeypatch.setattr(examine_setup, "accept_device", sign)
-    monkeypatch.setattr(daily_check, "_open", opened)
+    monkeypatch.setattr(daily_check, "_open_free_device", opened)
     monkeypatch.setattr(daily_check, "_protocol", short)
     doctor = ["doctor", "--device", "omega3", "--data", str(tmp_path), "--hands-off"]
     assert main([*doctor, "--accept", "Ada"]) == 0
