@@ -71,15 +71,15 @@ class InverseBalance:
     def least_error(self, law: ForceOfCommand, beside: Sequence[int]) -> float:
         """Sum of squares on the fitted samples: a lower bound for each law that this sum approximates."""
         fit, _ = self._blocks(self._rows(law, beside), False)
-        products = [block_products(block, range(len(fit[0].pull))) for block in fit]
-        weights = solve_normal_equations(summed_products(fit, range(len(fit[0].pull))), RIDGE)
+        products = [block_products(block, range(len(fit[0].cross))) for block in fit]
+        weights = solve_normal_equations(summed_products(fit, range(len(fit[0].cross))), RIDGE)
         return sum(squared_error(own, weights, block.power) for own, block in zip(products, fit, strict=True))
 
     def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
         """(blocks,): sums of squares. judged: on the held-out blocks; else on each fold."""
         tested = judged and blocks_to_judge(self.search.regression) is self.search.regression.test
         fit, test = self._blocks(self._rows(law, laws), tested)
-        columns = list(range(len(fit[0].pull)))
+        columns = list(range(len(fit[0].cross)))
         whole = summed_products(fit, columns)
         if tested:
             weights = solve_normal_equations(whole, RIDGE)

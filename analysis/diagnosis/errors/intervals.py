@@ -29,8 +29,8 @@ def standard_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known
     """(t + numbers,): standard errors of the deviations and of the hypothesis's point; 0 for numbers at a bound."""
     errors = residuals_to_fit(measure, fitted.residuals)
     own = hypothesis_sensitivity(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
-    pulls = _stretches(measure, known, own, errors)
-    middle = pulls @ pulls.T
+    scores = _stretches(measure, known, own, errors)
+    middle = scores @ scores.T
     t, across = len(fitted.deviations), known.on(own)
     information = np.block([[known.squares, across], [across.T, own @ own.T]])
     # The calibration is one more observation per parameter, with a standard deviation of one.
@@ -45,20 +45,20 @@ def segment_errors(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, known:
     """(t + numbers,): jackknife standard errors over segments; None where there is one segment."""
     errors = residuals_to_fit(measure, fitted.residuals)
     own = hypothesis_sensitivity(measure, tuning, fitted, errors) * ~_at_an_end(fitted.hypothesis)[:, None]
-    products, pulls = [], []
+    products, scores = [], []
     for begin, end in _segments(measure):
         moves = np.vstack([known.over(begin, end), own[:, begin:end]])
         products.append(moves @ moves.T)
-        pulls.append(moves @ errors[begin:end])
+        scores.append(moves @ errors[begin:end])
     if len(products) < 2:
         return None
     whole, t = np.sum(products, axis=0), len(fitted.deviations)
     whole[:t, :t] += np.eye(t)
     scale = np.sqrt(np.maximum(np.diagonal(whole), np.finfo(float).tiny))
     left_out = []
-    for part, pull in zip(products, pulls, strict=True):
+    for part, rhs in zip(products, scores, strict=True):
         rest = (whole - part) / np.outer(scale, scale)
-        left_out.append(np.linalg.pinv(rest, rcond=1e-12, hermitian=True) @ (pull / scale) / scale)
+        left_out.append(np.linalg.pinv(rest, rcond=1e-12, hermitian=True) @ (rhs / scale) / scale)
     moved, count = np.array(left_out), len(left_out)
     return np.asarray(np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)))
 
@@ -82,13 +82,13 @@ def _at_an_end(hypothesis: Hypothesis) -> Mask:
 
 def _stretches(measure: ErrorMeasure, known: Sensitivity, own: FloatArray, errors: FloatArray) -> FloatArray:
     """(t + numbers, stretches): score of each number (column times residual), summed per stretch."""
-    pulls, first = [], 0
+    scores, first = [], 0
     for record in measure.records:
         width = record.measured.shape[1] * max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
         last = first + int(record.fit.sum()) * record.measured.shape[1]
         for begin in range(first, last, width):
             end = min(begin + width, last)
             part = slice(begin, end)
-            pulls.append(np.concatenate([known.over(begin, end) @ errors[part], own[:, part] @ errors[part]]))
+            scores.append(np.concatenate([known.over(begin, end) @ errors[part], own[:, part] @ errors[part]]))
         first = last
-    return np.array(pulls).T.reshape(len(known.columns) + len(own), -1)
+    return np.array(scores).T.reshape(len(known.columns) + len(own), -1)

@@ -188,20 +188,20 @@ def _gauss_newton_step(
     with np.errstate(over="ignore", invalid="ignore"):
         cross = known.on(own)
         products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
-        pull = np.concatenate([known.on(errors) - from_.deviations, own @ errors])
-    if not (np.isfinite(products).all() and np.isfinite(pull).all()):
+        rhs = np.concatenate([known.on(errors) - from_.deviations, own @ errors])
+    if not (np.isfinite(products).all() and np.isfinite(rhs).all()):
         # A parameter made the simulation diverge.
         return None
     now = np.concatenate([from_.deviations, from_.hypothesis.point])
     low, high = (bound - now for bound in _bounds(from_.hypothesis, t))
     longest = _longest(from_.hypothesis)
     low[t:], high[t:] = np.maximum(low[t:], -longest), np.minimum(high[t:], longest)
-    found, impossible = _first_better(measure, tuning, from_, (products, pull), (low, high))
+    found, impossible = _first_better(measure, tuning, from_, (products, rhs), (low, high))
     if found is None and impossible:
         # A mass whose best value is negative must not stop the other parameters: it stays fixed.
         masses = [place for place, name in enumerate(tuning.names) if name.startswith("mass")]
         low[masses] = high[masses] = 0.0
-        found, _ = _first_better(measure, tuning, from_, (products, pull), (low, high))
+        found, _ = _first_better(measure, tuning, from_, (products, rhs), (low, high))
     return found
 
 
@@ -214,11 +214,11 @@ def _first_better(
 ) -> tuple[Fitted | None, bool]:
     """The fit after the first of ever shorter steps that lowers the cost, None where none does; and whether any step
     led to an invalid mechanical model. system: normal matrix and right side."""
-    (products, pull), t, impossible = system, len(from_.deviations), False
+    (products, rhs), t, impossible = system, len(from_.deviations), False
     # Steps that make the model less stable are refused, unless it is unstable already.
     grows = is_unstable_within(tuning.tune(from_.deviations), _longest_s(measure))
     for damping in (1e-9, 1e-3, 0.1, 3.0):
-        step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, *bounds)
+        step = bounded_step(products + damping * np.diag(np.diagonal(products)), rhs, *bounds)
         there = replace(from_.hypothesis, point=from_.hypothesis.point + step[t:])
         try:
             model = tuning.tune(from_.deviations + step[:t])
@@ -267,13 +267,14 @@ def _longest(hypothesis: Hypothesis) -> FloatArray:
     return np.array([LARGEST_STEPS[number.parameter.scale] for number in hypothesis.numbers])
 
 
-def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Least-squares step within bounds: parameters that would leave their range are fixed at its end (active set)."""
-    step, held = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
-    for _ in range(2 * len(pull) + 2):
+def bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Least-squares step within bounds: parameters that would leave their range are fixed at its end (active set).
+    products, rhs: matrix and right-hand side of the normal equations."""
+    step, held = np.zeros(len(rhs)), np.zeros(len(rhs), dtype=bool)
+    for _ in range(2 * len(rhs) + 2):
         free = ~held
         wanted = step.copy()
-        rest = pull[free] - products[np.ix_(free, held)] @ step[held]
+        rest = rhs[free] - products[np.ix_(free, held)] @ step[held]
         wanted[free] = np.linalg.lstsq(products[np.ix_(free, free)], rest, rcond=1e-14)[0]
         out = free & ((wanted < low) | (wanted > high))
         if not out.any():

@@ -170,8 +170,8 @@ def _squares_after_retuning(
     tuned, t = np.zeros(len(known)), len(rival.deviations)
     wanted = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + differs
     whole, least, rest = float(differs @ differs), np.inf, differs
-    pull = moves @ differs
-    straight = whole - float(pull @ np.linalg.lstsq(moves @ moves.T + known, pull, rcond=None)[0])
+    rhs = moves @ differs
+    straight = whole - float(rhs @ np.linalg.lstsq(moves @ moves.T + known, rhs, rcond=None)[0])
     for _ in range(RETUNED):
         step = np.linalg.lstsq(moves @ moves.T + known, moves @ rest - known @ tuned, rcond=None)[0]
         tuned = tuned + step
