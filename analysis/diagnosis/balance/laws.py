@@ -73,16 +73,16 @@ def likely_pitches(
     """Pitches of the four strongest lines in the spectrum of the residual force over the position, the strongest first.
     remainders: per motion, (kept samples,)."""
     q = np.concatenate([each.position[:: each.step, channel][each.valid_samples(each.fit)] for each in motions])
-    left = np.concatenate([r[each.valid_samples(each.fit)] for each, r in zip(motions, remainders, strict=True)])
+    residual = np.concatenate([r[each.valid_samples(each.fit)] for each, r in zip(motions, remainders, strict=True)])
     longest = _longest_pitch(of)
     # Shorter pitches give frequencies above the band's end at the usual speed.
     shortest = max(of.speed / of.band_hz, longest / 400)
-    if shortest >= longest or not len(left):
+    if shortest >= longest or not len(residual):
         return []
     finest = 1 / (2 * np.pi) if of.turns else 1 / of.travel
     lines = np.arange(1 / longest, 1 / shortest, finest * (1.0 if of.turns else 0.35))[:600]
     every = max(len(q) // 6000, 1)
-    power = np.array([abs(np.mean(left[::every] * np.exp(-2j * np.pi * line * q[::every]))) for line in lines])
+    power = np.array([abs(np.mean(residual[::every] * np.exp(-2j * np.pi * line * q[::every]))) for line in lines])
     peaks = [k for k in range(len(power)) if power[k] == power[max(k - 2, 0) : k + 3].max()]
     return [float(1 / lines[k]) for k in sorted(peaks, key=lambda k: -power[k])[:4]]
 

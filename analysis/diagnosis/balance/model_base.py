@@ -62,9 +62,9 @@ def _sensitive_columns(given: GivenBase) -> list[int]:
 
 def _power_per_freedom(plain: Regression) -> float:
     """Residual sum of squares over its degrees of freedom, with the free parameters fitted without their prior."""
-    left = plain.remainder(plain.columns_of(()))
+    residuals = plain.remainder(plain.columns_of(()))
     power, freedom = 0.0, 0.0
-    for residual, motion in zip(left, plain.motions, strict=True):
+    for residual, motion in zip(residuals, plain.motions, strict=True):
         known_residual = np.where(motion.valid_samples(motion.fit), residual, 0.0)
         lines = np.abs(np.fft.rfft(known_residual)) ** 2
         power += float(known_residual @ known_residual)

@@ -191,11 +191,11 @@ def _add_cogging_laws(first: Regression, scales: Sequence[Scales]) -> Regression
 
 def _add_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequence[int]) -> Regression:
     """The regression with cogging at the pitches that the residual of these laws shows."""
-    left = regression.remainder(regression.columns_of(laws))
+    residuals = regression.remainder(regression.columns_of(laws))
     more = [
         cogging_law(c, pitch, of)
         for c, of in enumerate(scales)
-        for pitch in likely_pitches(regression.motions, left, c, of)
+        for pitch in likely_pitches(regression.motions, residuals, c, of)
     ]
     return append_laws(regression, more) if more else regression
 

@@ -58,10 +58,10 @@ def _scatter(alike: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArra
     strengths = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
     known = strengths.min(axis=1) > 1e-6 * strengths.max()
     explained = np.sum(np.abs(np.swapaxes(basis.conj(), 1, 2) @ response) ** 2, axis=1)
-    left = np.maximum(np.sum(np.abs(response) ** 2, axis=1) - explained, 0.0)
+    residual_power = np.maximum(np.sum(np.abs(response) ** 2, axis=1) - explained, 0.0)
     freedom = np.count_nonzero(driven[:, :, 0], axis=1) - m
     usable = known & (freedom > 0)
-    total = smooth_over_lines(np.where(usable[:, None], left, 0.0), _LINES)
+    total = smooth_over_lines(np.where(usable[:, None], residual_power, 0.0), _LINES)
     return np.asarray(total / np.maximum(smooth_over_lines(np.where(usable, freedom, 0.0)[:, None], _LINES), 1e-12))
 
 
