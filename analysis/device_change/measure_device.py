@@ -40,7 +40,8 @@ class DeviceMeasures:
 
 
 def measure_device(recording: Recording) -> DeviceMeasures:
-    """recording: strokes and a broadband excitation along every axis, with rests. Raises NotMeasurableError."""
+    """Friction, frequency response and noise of a free device. recording: strokes and a broadband excitation along
+    every axis, with rests. Raises NotMeasurableError."""
     recording = _without_gaps(recording)
     response = _response(recording)
     friction = np.array([_friction_n(recording, axis) for axis in range(len(recording.command.channels))])

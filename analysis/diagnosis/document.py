@@ -209,7 +209,8 @@ def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
-    """document: without format and version. Raises DiagnosisError with every problem, by its place."""
+    """Parse the document of a diagnosis. document: without format and version. Raises DiagnosisError with every
+    problem, by its place."""
     try:
         # Through JSON: strict checking then accepts a list for a tuple, but no text for a number.
         return _ADAPTER.validate_json(json.dumps(document), strict=True)

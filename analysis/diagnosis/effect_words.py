@@ -216,7 +216,7 @@ def unit_of(effect: str, parameter: str, system: UnitSystem) -> str:
 
 
 def place_words(place: Place, axis: str | None, single: bool = False) -> str:
-    """single: the device has one axis, which then needs no name."""
+    """Where an effect acts, in words. single: the device has one axis, which then needs no name."""
     if place == "hand":
         return "at the handle" if axis is None or single else f"at the handle, along {axis}"
     seat, all_ = _SEATS[place]

@@ -35,7 +35,7 @@ class ResponseCurve:
 def transfer_functions_picture(
     response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
 ) -> Picture:
-    """band_hz: marked in every panel, as the band of a fit."""
+    """Figure of all transfer functions. band_hz: marked in every panel, as the band of a fit."""
     return Picture(
         name="transfer-functions",
         title="Transfer functions of all channels",

@@ -32,7 +32,7 @@ REPEAT_SD_DB = 2.4
 def study_warnings(
     trials: Sequence[Trial], rows: Sequence[Threshold], table: ThresholdTable, protocol: StudyProtocol
 ) -> tuple[str, ...]:
-    """trials: of the test phase. rows, table: what was computed from them."""
+    """All warnings about a study's results. trials: of the test phase. rows, table: what was computed from them."""
     if not rows:
         return ("No test trial is there, so there is no threshold of direction.",)
     candidates = (

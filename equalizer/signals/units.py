@@ -149,8 +149,8 @@ def parse_unit(text: str) -> Unit:
 
 
 def check_quantity(quantity: str, unit: Unit) -> None:
-    """Raises UnknownUnitError where a well-known quantity has a unit of something else. A quantity of unknown scale
-    (unit 1) may be any."""
+    """Check that a quantity has a unit of its kind. Raises UnknownUnitError where a well-known quantity has a unit of
+    something else. A quantity of unknown scale (unit 1) may be any."""
     fitting = QUANTITY_UNITS.get(quantity)
     if fitting and unit.si not in (*fitting, UNSTATED):
         raise UnknownUnitError(

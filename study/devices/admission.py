@@ -50,7 +50,8 @@ FADE_SHAPES = ("raised_cosine", "linear")
 
 
 def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
-    """Raises `DeviceError` for limits that are no limits, or weaker than may be, and for a device of no known kind."""
+    """Check limits and device before opening. Raises `DeviceError` for limits that are no limits, or weaker than may
+    be, and for a device of no known kind."""
     _check_info(info)
     limits = settings.limits
     times = {name: getattr(limits, name) for name in HIGHEST if name != "keep_s"} | {"keep_s": settings.keep_s}
@@ -66,7 +67,8 @@ def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
 
 
 def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: DeviceSettings) -> None:
-    """Raises `DeviceError` for a real device in a hand that would hold its force when this program is gone."""
+    """Check that the hardware releases its force by itself. Raises `DeviceError` for a real device in a hand that would
+    hold its force when this program is gone."""
     if info.simulated or not settings.hand_on_handle or 0 < drops_force_after_s <= LONGEST_DROP_S:
         return
     raise DeviceError(
@@ -78,7 +80,7 @@ def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: Devic
 
 
 def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> None:
-    """Raises `DeviceError` for a loop that cannot be held within the limits."""
+    """Check that a stimulus can be held. Raises `DeviceError` for a loop that cannot be held within the limits."""
     if stimulus.fade_shape not in FADE_SHAPES:
         raise _refusal(f"its fade shape is {stimulus.fade_shape!r}; known are {' and '.join(FADE_SHAPES)}")
     for name, seconds in (("fade_in_s", stimulus.fade_in_s), ("fade_out_s", stimulus.fade_out_s)):
@@ -93,7 +95,8 @@ def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> No
 
 
 def check_commands(commands: Signal, limits: Limits, rate_hz: float) -> None:
-    """Raises `DeviceError` for commands that cannot be played within the limits, from zero force on."""
+    """Check that commands can be played once. Raises `DeviceError` for commands that cannot be played within the
+    limits, from zero force on."""
     _check_forces(commands, limits, rate_hz)
     _check_steps(np.diff(commands.samples, axis=0, prepend=0.0), limits, rate_hz)
 

@@ -145,7 +145,7 @@ def open_onset_line(settings: PulseSettings) -> OnsetLine:
 
 
 def open_port(settings: PulseSettings) -> Line:
-    """Raises OSError, ValueError, and `DeviceError` where pyserial is missing."""
+    """Open a serial line for onset pulses. Raises OSError, ValueError, and `DeviceError` where pyserial is missing."""
     if settings.kind == "parallel":
         return _Parallel(settings)
     try:

@@ -72,7 +72,8 @@ class LinkageSource(Protocol):
         ...
 
     def check_frame(self) -> None:
-        """Raises `DeviceError` where the positions above are not in the axes of the device's readings."""
+        """Check the axes of the positions that a linkage's calibration uses. Raises `DeviceError` where the positions
+        above are not in the axes of the device's readings."""
         ...
 
 

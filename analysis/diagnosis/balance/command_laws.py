@@ -82,7 +82,7 @@ AS_COMMANDED = CommandLaw("as_commanded", {}, lambda u, _: u[:, None])
 
 
 def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
-    """command: (n,), known throughout."""
+    """All static nonlinearities of the actuator, over their grids of parameters. command: (n,), known throughout."""
     size = np.abs(command)
     for width in _sizes(size, DEADBAND_QUANTILES):
         for jump in (0.0, 1.0):

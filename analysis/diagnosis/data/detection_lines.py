@@ -37,8 +37,9 @@ class DetectionLines:
 
 
 def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines | None:
-    """excitation: (lines, inputs), line k in row k - 1. held: samples for which each value of the command is held;
-    above half of the command's own rate there are only images. None where nothing is driven."""
+    """Driven lines of a periodic excitation, and silent ones on which distortion shows. excitation: (lines, inputs),
+    line k in row k - 1. held: samples for which each value of the command is held; above half of the command's own rate
+    there are only images. None where nothing is driven."""
     size = np.abs(excitation)
     size[(len(size) + 1) // held :] = 0
     strongest = size.max()

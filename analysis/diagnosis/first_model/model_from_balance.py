@@ -26,8 +26,9 @@ class FirstModel:
 
 
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
-    """recording: what `reduce_recordings` makes of it, where the balances hold more than one body per command. None
-    where not each command drives one measured motion. Raises MechanicalModelError."""
+    """A linear model with the masses, dampers and springs of force balances. recording: what `reduce_recordings` makes
+    of it, where the balances hold more than one body per command. None where not each command drives one measured
+    motion. Raises MechanicalModelError."""
     regressions = [balance.search.regression for balance in balances]
     count = len(balances)
     if count > len(regressions[0].motions[0].channels) or count != len(recording.response.channels):

@@ -41,7 +41,8 @@ class ForceViews:
 def force_views(
     records: Sequence[Observed], model: MechanicalModel, floors: Sequence[NoiseFloor], band_hz: float | None = None
 ) -> ForceViews:
-    """records: with motion, see `has_motion`. band_hz: up to which forces are compared; None = by the noise."""
+    """The error measure by forces along the measured motion, with its noise. records: with motion, see `has_motion`.
+    band_hz: up to which forces are compared; None = by the noise."""
     motions = [measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)]
     applied = [
         actuator_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)

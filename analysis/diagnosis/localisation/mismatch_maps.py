@@ -165,7 +165,8 @@ class ModelError:
 
 
 def model_error(held_out: Sequence[MismatchCell]) -> ModelError:
-    """held_out: cells of samples that nothing was fitted to, of the most complete model."""
+    """The typical error of a model, from its held-out cells. held_out: cells of samples that nothing was fitted to, of
+    the most complete model."""
     found: dict[tuple[str, str], list[_HeldOutShare]] = {}
     for cell in held_out:
         found.setdefault((cell.output, cell.quantity), []).append(_HeldOutShare(_fold(cell), cell.band_hz, cell.share))

@@ -41,7 +41,8 @@ class Experiment:
 
 
 def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, level: float) -> tuple[Experiment, ...]:
-    """axis: where the rivals act. level: the highest that was recorded; no higher one is proposed."""
+    """Recordings that can be proposed. axis: where the rivals act. level: the highest that was recorded; no higher one
+    is proposed."""
     usual_hz = min(USUAL_HZ, USUAL_SHARE * sample_rate_hz)
     fastest_hz = FASTEST_SHARE * sample_rate_hz
     slowest_hz = min(SLOWEST_HZ, SLOWEST_SHARE * usual_hz)

@@ -102,7 +102,8 @@ def reproduction_to_json(reproduction: Reproduction) -> dict[str, Any]:
 
 
 def reproduction_from_json(document: dict[str, Any]) -> Reproduction:
-    """document: without format and version. Raises ReproductionError with every problem, by its place."""
+    """Parse the document of a reproduction. document: without format and version. Raises ReproductionError with every
+    problem, by its place."""
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:

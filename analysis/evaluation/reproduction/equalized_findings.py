@@ -51,7 +51,8 @@ class EqualizedRows:
 def equalized_findings(
     rows: EqualizedRows, held_out: tuple[float, float] | None, remarks: tuple[str, ...] = ()
 ) -> FigureFindings:
-    """held_out: error of the centre's model on what was kept from it, and the same of the device without friction."""
+    """Findings of figure 5. held_out: error of the centre's model on what was kept from it, and the same of the device
+    without friction."""
     findings = (
         _resonance(rows),
         _peaks(rows),

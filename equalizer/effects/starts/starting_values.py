@@ -78,7 +78,8 @@ class PartialRegression:
         return np.asarray(shapes - self._known @ (self._known.T @ shapes))
 
     def fit(self, *laws: FloatArray) -> LawFit:
-        """laws: (n,) each, evaluated with the factor 1."""
+        """Least-squares fit of laws to the missing force, the linear part projected out. laws: (n,) each, evaluated
+        with the factor 1."""
         shapes = self._residual_without(np.column_stack(laws))
         size = np.linalg.norm(shapes, axis=0)
         shapes = shapes / np.where(size > 0, size, 1.0)

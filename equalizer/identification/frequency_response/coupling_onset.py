@@ -59,8 +59,8 @@ class CouplingOnset:
 
 
 def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -> CouplingOnset:
-    """response: as estimated, not smoothed yet, with inputs and outputs in one frame. Raises ValueError if it is not
-    square, or has too few lines above the noise."""
+    """The frequency from which driving one axis moves the others. response: as estimated, not smoothed yet, with inputs
+    and outputs in one frame. Raises ValueError if it is not square, or has too few lines above the noise."""
     rule = rule or OnsetRule()
     require_equal_axes(response.response)
     lines = response.of_lines(response.reliable)

@@ -54,7 +54,7 @@ class FrequencyResponse:
         return self.of_lines((self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz))
 
     def of_lines(self, chosen: BoolArray) -> "FrequencyResponse":
-        """chosen: (lines,)."""
+        """The response on chosen lines. chosen: (lines,)."""
         return FrequencyResponse(
             self.frequency_hz[chosen],
             self.response[chosen],

@@ -65,7 +65,8 @@ def modal_form(A: FloatArray, C: FloatArray) -> ModalForm:
 
 
 def from_poles(poles: ComplexArray, shapes: ComplexArray) -> ModalForm:
-    """poles: (n,), conjugates included; shapes: (p, n), the outputs' share in each."""
+    """The real modal form of given poles and output shapes. poles: (n,), conjugates included; shapes: (p, n), the
+    outputs' share in each."""
     upper = np.flatnonzero(poles.imag > 0)
     real = np.flatnonzero(poles.imag == 0)
     real = real[np.argsort(poles[real].real)]

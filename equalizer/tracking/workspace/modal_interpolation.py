@@ -55,7 +55,8 @@ class ModalInterpolation:
 
 
 def modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
-    """Raises ModesDoNotMatchError where it is doubtful which resonances of neighbouring models are the same."""
+    """Match the resonances of neighbouring models for an interpolation. Raises ModesDoNotMatchError where it is
+    doubtful which resonances of neighbouring models are the same."""
     band_hz = workspace.band_hz
     modes = [band_modes(model, band_hz) for model in workspace.models]
     tracks = _track_modes(workspace, modes)

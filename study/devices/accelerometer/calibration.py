@@ -53,7 +53,8 @@ class Calibration:
 
 
 def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
-    """positions: raw samples (n, 3) at rest in each of `POSITIONS`.
+    """Bias, sensitivity matrix and noise by least squares from six positions under gravity. positions: raw samples (n,
+    3) at rest in each of `POSITIONS`.
 
     Raises ValueError that says which position does not fit, or that a channel hardly answers.
     """

@@ -48,7 +48,8 @@ class PlacedSamples:
 
 
 def place(stretch: ArrivedSamples, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
-    """values: (n, channels) of the samples; tick_s: (k,), rising, when the ticks were due, rate_hz apart."""
+    """Resample samples to the ticks of the loop. values: (n, channels) of the samples; tick_s: (k,), rising, when the
+    ticks were due, rate_hz apart."""
     host_s = np.full(len(stretch.device_s), np.nan)
     best: ClockFit | None = None
     most = 0

@@ -30,7 +30,8 @@ LATENESS_S = 0.05
 
 
 class Accelerometer:
-    """raw_range: the lowest and the highest raw value that are within the sensor's range."""
+    """An accelerometer with its own clock: the newest sample at any time, and resampled ones after a recording.
+    raw_range: the lowest and the highest raw value that are within the sensor's range."""
 
     def __init__(self, source: Source, calibration: Calibration, raw_range: tuple[float, float]) -> None:
         self._source, self._calibration, self._range = source, calibration, raw_range

@@ -29,7 +29,7 @@ DUMMY_V = -9999.0
 
 
 def open_source(port: str, baud: int) -> Source:
-    """Raises `DeviceError`."""
+    """Open the source of samples at a port, by its name. Raises `DeviceError`."""
     if port.startswith(NI):
         return _open_source(lambda: NiSource(port.removeprefix(NI)), port, "nidaqmx", "ni", "NI-DAQmx from ni.com")
     if port.startswith(LABJACK):
@@ -65,7 +65,7 @@ class ScanCounter:
 
 
 class NiSource:
-    """Raises what nidaqmx raises."""
+    """A data-acquisition device of National Instruments. Raises what nidaqmx raises."""
 
     def __init__(self, device: str) -> None:
         nidaqmx, constants = import_module("nidaqmx"), import_module("nidaqmx.constants")
@@ -95,7 +95,7 @@ class NiSource:
 
 
 class LabJackSource:
-    """Raises what labjack-ljm raises."""
+    """A LabJack. Raises what labjack-ljm raises."""
 
     def __init__(self, identifier: str) -> None:
         self._ljm: Any = import_module("labjack.ljm")

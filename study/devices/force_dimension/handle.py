@@ -58,7 +58,8 @@ class Status:
 
 
 class Handle:
-    """Raises `LibraryError` from every method but `let_go`."""
+    """An open device: the vendor's functions with values in place of pointers. Raises `LibraryError` from every method
+    but `let_go`."""
 
     def __init__(self, library: Library, number: int) -> None:
         self.library = library

@@ -71,7 +71,8 @@ def lab_file() -> Path:
 
 
 def read_lab() -> LabSettings:
-    """Raises `DeviceError` for a file that cannot be read. Without one, nothing is known."""
+    """Read the laboratory's settings. Raises `DeviceError` for a file that cannot be read. Without one, nothing is
+    known."""
     path = lab_file()
     try:
         text = path.read_text("utf-8")

@@ -116,7 +116,7 @@ class Library:
         return np.array([address_of(self._functions[name]) for name in names], dtype=np.int64)
 
     def call(self, name: str, *arguments: Any) -> int:
-        """Raises `LibraryError`."""
+        """Call a function of the library. Raises `LibraryError`."""
         return self.check_answer(name, int(self.function(name)(*arguments)))
 
     def _version(self) -> tuple[int, int, int, int]:

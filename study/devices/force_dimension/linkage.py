@@ -52,7 +52,8 @@ class VendorLinkage:
         return self._ask_library(lambda place: self._angles(self._counts(place)), position_m)
 
     def check_frame(self) -> None:
-        """Raises `DeviceError` where the library's delta functions and its positions do not mean the same axes."""
+        """Check the axes of the library's functions for the linkage. Raises `DeviceError` where the library's delta
+        functions and its positions do not mean the same axes."""
         try:
             here = np.array(self._handle.position_m())
         except LibraryError as error:

@@ -20,7 +20,8 @@ RATE_HZ = 1000.0
 
 
 def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:
-    """Raises `DeviceError` that says what is missing. What was opened until then is stopped and closed again."""
+    """Open a device of the vendor by name, with calibration, watchdog and gravity compensation. Raises `DeviceError`
+    that says what is missing. What was opened until then is stopped and closed again."""
     model, lab = MODELS[name], read_lab()
     library = load_library()
     sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None and settings.with_sensor else None
@@ -58,7 +59,7 @@ def _rig(
 
 
 def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
-    """Raises `LibraryError`."""
+    """Facts about an open device. Raises `LibraryError`."""
     return DeviceInfo(
         name=model.name,
         simulated=False,

@@ -38,7 +38,8 @@ NEVER_HELD = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
 
 
 def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevice":
-    """Raises what opening the device in the process raised, or `DeviceError` where that ended or hangs."""
+    """Open a device in a process of its own. Raises what opening the device in the process raised, or `DeviceError`
+    where that ended or hangs."""
     process: LoopProcess | None = None
     ring = Ring()
     try:

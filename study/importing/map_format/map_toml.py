@@ -21,7 +21,7 @@ MAP_SCHEMA: Node = _ADAPTER.json_schema()
 
 
 def parse_map(text: str, source: Path) -> ImportMap:
-    """source: for messages. Raises UnusableFileError with one problem for each key."""
+    """Parse the text of a map. source: for messages. Raises UnusableFileError with one problem for each key."""
     try:
         values = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:

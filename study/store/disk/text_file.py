@@ -39,7 +39,8 @@ ended, so that the search is linear."""
 
 
 def read_toml_text(path: Path, kind: str) -> str:
-    """kind: what it should be, for messages. Raises CannotReadError, UnusableFileError."""
+    """The text of a TOML file whose parsing takes ordinary time. kind: what it should be, for messages. Raises
+    CannotReadError, UnusableFileError."""
     text = read_text(path, TOML_BYTES)
     if problem := too_long_key(text):
         raise UnusableFileError(path, kind, (problem,))

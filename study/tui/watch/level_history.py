@@ -49,7 +49,7 @@ class LevelHistory(Widget):
 def level_history(
     points: Sequence[StaircasePoint], next_n: float | None, cap_n: float, size: tuple[int, int]
 ) -> Content:
-    """size: columns and rows, labels and legend included."""
+    """The staircase with its marks, levels and legend as lines. size: columns and rows, labels and legend included."""
     columns, rows = size[0] - LABEL_COLUMNS, size[1] - 1
     levels = [point.level_n for point in points] + ([next_n] if next_n is not None else [])
     lowest_n = min([cap_n / LEAST_RANGE, *(0.85 * level for level in levels)])

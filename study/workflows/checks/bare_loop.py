@@ -51,7 +51,8 @@ class BareLoop:
 
 @dataclass(slots=True)
 class BareRun:
-    """result: None until the loop has ended; why: reason if there is none."""
+    """A bare loop that runs, or has run, beside the device's. result: None until the loop has ended; why: reason if
+    there is none."""
 
     result: BareLoop | None = None
     why: str = ""
@@ -92,7 +93,8 @@ def _read(process: "subprocess.Popen[bytes]", seconds: float, run: BareRun) -> N
 
 
 def judge_beside(late_ticks: int, ticks: int, run: BareRun) -> DeviceFinding:
-    """late_ticks: of the loop beside it, missed ones included."""
+    """Compare the late ticks of the device's loop with those of the bare loop. late_ticks: of the loop beside it,
+    missed ones included."""
     if run.result is None:
         return DeviceFinding(NAME, f"not compared: {run.why}", fine=True)
     bare = run.result

@@ -86,7 +86,7 @@ def _baseline_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -
 
 
 def require_real(name: str) -> None:
-    """Raises WrongUseError for a device that is never accepted."""
+    """Require a device that can be accepted. Raises WrongUseError for a device that is never accepted."""
     if not needs_real_time(name):
         raise WrongUseError("There is nothing to compare with", f"{name!r} is never accepted.", "Leave --daily out.")
 
@@ -147,7 +147,8 @@ def _write_check(
 
 
 def compare_recordings(baseline: Recording, today: Recording) -> tuple["Change", ...]:
-    """Raises DeviceError where one of them does not tell what is compared."""
+    """Changes between the accepted recording and today's. Raises DeviceError where one of them does not tell what is
+    compared."""
     # Imported here: every sitting reads the last check, but only a check needs the comparison, which is slow to import.
     from analysis.device_change.compare_devices import compare_devices
     from analysis.device_change.measure_device import NotMeasurableError

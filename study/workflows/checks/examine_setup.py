@@ -115,7 +115,8 @@ def _settings(name: str, timing_s: float) -> DeviceSettings:
 
 
 def require_sensor(examination: Examination) -> None:
-    """Raises DeviceError where a daily check would record no acceleration."""
+    """Require an accelerometer for a daily check. Raises DeviceError where a daily check would record no
+    acceleration."""
     if not examination.sensed:
         raise DeviceError(
             "The daily check did not begin",

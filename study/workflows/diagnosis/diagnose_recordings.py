@@ -217,7 +217,7 @@ def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: Mechanical
 
 
 def check_names(without: Sequence[str]) -> None:
-    """Raises WrongUseError for a name that no effect has."""
+    """Check the names of effects to leave out. Raises WrongUseError for a name that no effect has."""
     for name in without:
         if name not in EFFECTS_BY_NAME:
             raise WrongUseError(

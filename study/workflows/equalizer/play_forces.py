@@ -23,7 +23,8 @@ HAND_CAP_N = 3.0
 
 
 def require_device_alone(models: PlaybackModels) -> None:
-    """Raises StudyError for a model that was identified with a hand on the handle."""
+    """Require a model of the device without a hand. Raises StudyError for a model that was identified with a hand on
+    the handle."""
     if any("held" in model.provenance.get("hand", ()) for model in models.given):
         raise _refusal(
             "The model was recorded with a hand on the handle: its forces are right for that hand in that moment.",

@@ -43,7 +43,7 @@ class FileContent:
 
 
 def open_content(path: Path) -> FileContent:
-    """Raises CannotReadError, UnusableFileError."""
+    """Open a file once, for all recognisers. Raises CannotReadError, UnusableFileError."""
     try:
         if path.is_dir():
             return FileContent(path, is_folder=True)

@@ -27,7 +27,7 @@ class SignalOutlet(Protocol):
     """An LSL outlet of a stream of samples."""
 
     def push(self, samples: FloatArray, at_s: FloatArray) -> None:
-        """samples (n, channels); at_s (n,): on LSL's clock."""
+        """Send samples with their times. samples (n, channels); at_s (n,): on LSL's clock."""
         ...
 
 

@@ -44,8 +44,9 @@ class _Begun:
 
 
 def planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[PlannedStudy, ...]:
-    """protocol: a name or file; None = all that were begun in `data`. simulated: of simulated participants instead of
-    people, who are counted apart. Raises StudyError where there is nothing to plan."""
+    """The plans of studies in a data folder. protocol: a name or file; None = all that were begun in `data`. simulated:
+    of simulated participants instead of people, who are counted apart. Raises StudyError where there is nothing to
+    plan."""
     begun = _find_begun(data, simulated)
     if protocol is not None:
         chosen = read_study_protocol(protocol, data).protocol

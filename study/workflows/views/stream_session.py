@@ -46,7 +46,7 @@ class Outlet(Protocol):
         ...
 
     def push(self, marker: str, at_s: float) -> None:
-        """at_s: on LSL's clock."""
+        """Send a marker with its time. at_s: on LSL's clock."""
         ...
 
 

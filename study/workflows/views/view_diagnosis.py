@@ -24,7 +24,8 @@ FIT_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allo
 
 
 def diagnosis_view(path: Path) -> DiagnosisView:
-    """Raises CannotReadError, UnusableFileError."""
+    """The view of a diagnosis, from its document and the improved model beside it. Raises CannotReadError,
+    UnusableFileError."""
     diagnosis, device = read_diagnosis(path), _device(path.parent / "improved.toml")
     report = path.parent / "report.html"
     view = DiagnosisView(

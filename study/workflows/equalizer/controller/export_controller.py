@@ -73,7 +73,7 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
 
 
 def controller_settings(weight: float, preview_s: float, cap_n: float) -> RealtimeSettings:
-    """Raises StudyError for what no loop can run."""
+    """Settings of the real-time controller from the order. Raises StudyError for what no loop can run."""
     if not preview_s <= LONGEST_PREVIEW_S:
         raise _refusal(f"A preview of {preview_s:g} s was asked for; {LONGEST_PREVIEW_S:g} s is the longest.", TRY)
     try:
