@@ -1,4 +1,4 @@
-"""The clock of the place where this computer stands, for what a person reads."""
+"""Local time of this computer, for texts that a person reads."""
 
 from datetime import UTC, datetime
 

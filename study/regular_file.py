@@ -12,6 +12,7 @@ DOCUMENT_BYTES = 2**24
 """Largest JSON and TOML document that is read; the largest that hapteq writes are below 1 MB."""
 
 _BLOCK_BYTES = 2**20
+"""Bytes that are read at once."""
 _KINDS = (
     (stat.S_ISFIFO, "it is a pipe, not a file"),
     (stat.S_ISSOCK, "it is a socket, not a file"),

@@ -207,7 +207,7 @@ def validated_here(monkeypatch) -> None:
     `test_validate_apart.py`, and takes seconds to start."""
     from study.workflows.files import validate_apart
 
-    monkeypatch.setattr(validate_apart, "_worker", lambda: ThreadPoolExecutor(max_workers=1))
+    monkeypatch.setattr(validate_apart, "_start_worker", lambda: ThreadPoolExecutor(max_workers=1))
 
 
 @pytest.fixture

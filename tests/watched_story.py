@@ -14,9 +14,9 @@ from study.session.facts.events import (
 )
 from study.session.state.due_trial import Present
 from study.session.state.machine import Finish, Rest, next_action
+from study.session.watching.followed_session import FollowedSession, begin_watching, follow
 from study.session.watching.live import Live
-from study.session.watching.watched import Watched, begin_watching, follow
-from study.session.watching.watching import LiveInfo, watch_view
+from study.session.watching.make_watch_view import LiveInfo, watch_view
 from tests.session_facts import opened, presented
 
 BEGAN = datetime(2026, 11, 22, 10, 0, tzinfo=UTC)
@@ -37,7 +37,7 @@ class Story:
     """A session under way; ten seconds for each trial."""
 
     def __init__(self, protocol, text, seed=7) -> None:
-        self.watched: Watched = begin_watching(
+        self.watched: FollowedSession = begin_watching(
             opened(protocol, text, utc=at(0), observer="scripted", seed=seed, device=DEVICE), protocol
         )
         self.seconds = 0.0

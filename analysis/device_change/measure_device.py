@@ -1,4 +1,7 @@
-"""Numbers of one recording of a free device: friction of slow strokes, frequency response, noise at rest."""
+"""Measures of a free device from one recording: friction from slow strokes, frequency response, noise at rest.
+
+Friction is the work lost in a closed stroke over its path, oint F dx / path: spring, weight and inertia do no net work.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -37,7 +40,8 @@ class DeviceMeasures:
 
 
 def measure_device(recording: Recording) -> DeviceMeasures:
-    """recording: strokes and a broadband excitation along every axis, with rests. Raises NotMeasurableError."""
+    """Friction, frequency response and noise of a free device. recording: strokes and a broadband excitation along
+    every axis, with rests. Raises NotMeasurableError."""
     recording = _without_gaps(recording)
     response = _response(recording)
     friction = np.array([_friction_n(recording, axis) for axis in range(len(recording.command.channels))])
@@ -127,8 +131,8 @@ def _noise(recording: Recording, rests: list[FloatArray]) -> tuple[FloatArray, i
     squares, samples = np.zeros(len(recording.response.channels)), 0
     for rest in rests:
         at = np.arange(len(rest)) - (len(rest) - 1) / 2
-        bent = rest - rest.mean(axis=0)
-        bent = bent - np.outer(at, at @ bent / max(float(at @ at), 1.0))
-        squares += np.sum(bent**2, axis=0)
+        detrended = rest - rest.mean(axis=0)
+        detrended = detrended - np.outer(at, at @ detrended / max(float(at @ at), 1.0))
+        squares += np.sum(detrended**2, axis=0)
         samples += len(rest)
     return np.sqrt(squares / max(samples, 1)), samples

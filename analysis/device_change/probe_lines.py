@@ -49,7 +49,8 @@ class ProbeLines:
 
 
 def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
-    """Raises ValueError where less than a period was kept, or samples are missing."""
+    """Force and acceleration at the lines of a probe. Raises ValueError where less than a period was kept, or samples
+    are missing."""
     period = round(period_s * recording.sample_rate_hz)
     decided = recording.command if recording.excitation is None else recording.excitation
     first, last = 0, len(recording)

@@ -13,7 +13,6 @@ from analysis.diagnosis.confirm.confirm_laws import (
     search_by_balance,
 )
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure, choose_fitting_measure, list_fitting_measures
-from analysis.diagnosis.confirm.laws_with_model import ResultBesideModel, judge_with_model
 from analysis.diagnosis.data.input_checks import is_too_short_to_name
 from analysis.diagnosis.data.observed_parts import names_of_parts
 from analysis.diagnosis.diagnosis_settings import BALANCE, DiagnosisSettings
@@ -171,8 +170,12 @@ def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_
 def _judge_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, outcome: SearchOutcome, settings: DiagnosisSettings
 ) -> tuple[SearchOutcome, tuple[Balance, ...]]:
-    weigh = partial(judge_with_model, recordings, fitting, outcome.result, settings.time_left)
-    beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultBesideModel(outcome.result))
+    """The outcome after the decision by held-out gain, and the force balances with the model as their base."""
+    # Imported here: only where a model is given.
+    from analysis.diagnosis.confirm.decide_with_model import ResultWithModel, decide_with_model
+
+    weigh = partial(decide_with_model, recordings, fitting, outcome.result, settings.time_left)
+    beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultWithModel(outcome.result))
     return replace(outcome, result=beside.result), beside.balances
 
 

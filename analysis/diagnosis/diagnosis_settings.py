@@ -1,4 +1,4 @@
-"""What a diagnosis considers, what it compares, and how long it may look."""
+"""Settings of a diagnosis: effects to consider, signals to compare, time limit."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ from equalizer.effects.law_entry import LawEntry
 from equalizer.signals.recording import Recording
 
 BALANCE = "the force balance"
-"""As a remark calls it where it crashes."""
+"""Name of the force balance in a remark about its crash."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -139,6 +139,8 @@ class Errors:
 
 @dataclass(frozen=True, config=STRICT)
 class Fit:
+    """Errors on the samples fitted to, and on held-out samples."""
+
     fit: Errors
     test: Errors
 
@@ -154,6 +156,8 @@ class NextExperiment:
 
 @dataclass(frozen=True, config=STRICT)
 class Diagnosis:
+    """The whole document."""
+
     verdict: Verdict
     mismatch: tuple[Mismatch, ...]
     effects: tuple[NamedEffect, ...]
@@ -205,7 +209,8 @@ def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
-    """document: without format and version. Raises DiagnosisError with every problem, by its place."""
+    """Parse the document of a diagnosis. document: without format and version. Raises DiagnosisError with every
+    problem, by its place."""
     try:
         # Through JSON: strict checking then accepts a list for a tuple, but no text for a number.
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
@@ -225,7 +230,7 @@ def _inseparable(effect: NamedEffect) -> tuple[str, ...]:
 
 
 _PLAIN = {"unexpected_keyword_argument": "this key is not known here", "missing": "this is missing"}
-"""What pydantic says in words of its own trade, by its kind of error."""
+"""Plain texts in place of pydantic's technical ones, by the type of its error."""
 
 
 def _sentence(place: tuple[str | int, ...], message: str) -> str:

@@ -189,7 +189,7 @@ OF_THE_WHOLE = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", 
 
 def noun_of(effect: str) -> str:
     """The plain noun of an effect; its name with spaces where it has none."""
-    known = _words(effect)
+    known = _find_words(effect)
     return known.noun if known else effect.replace("_", " ")
 
 
@@ -200,7 +200,7 @@ def place_of(effect: str) -> Place:
     return known.place if known is not None else "mechanism" if law is None else law.place
 
 
-def _words(effect: str) -> EffectWords | None:
+def _find_words(effect: str) -> EffectWords | None:
     law = LAW_WORDS.get(effect)
     return EFFECT_WORDS.get(effect) if law is None else law.words
 
@@ -216,7 +216,7 @@ def unit_of(effect: str, parameter: str, system: UnitSystem) -> str:
 
 
 def place_words(place: Place, axis: str | None, single: bool = False) -> str:
-    """single: the device has one axis, which then needs no name."""
+    """Where an effect acts, in words. single: the device has one axis, which then needs no name."""
     if place == "hand":
         return "at the handle" if axis is None or single else f"at the handle, along {axis}"
     seat, all_ = _SEATS[place]
@@ -234,7 +234,7 @@ _SEATS: Mapping[str, tuple[str, str]] = {
 
 def numbers_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
     """ "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest"."""
-    known = _words(effect)
+    known = _find_words(effect)
     named = dict(known.numbers) if known else {}
     if not named:
         main = (EFFECTS_BY_NAME[effect].main.name,) if effect in EFFECTS_BY_NAME else tuple(parameters)[:1]

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 Mask = npt.NDArray[np.bool_]
-"""Which samples, or which lines of a spectrum, count."""
+"""Mask of the samples, or of the lines of a spectrum, that count."""
 
 Mapper = Callable[..., Iterable[object]]
 """`map`, or a function that works in parallel and keeps the order."""
@@ -15,4 +15,4 @@ Progress = Callable[[str, float], None]
 """Called with what is being done, and the share of the whole work that is done."""
 
 TimeBudget = Callable[[], bool]
-"""Asked before each piece of a search: whether to go on."""
+"""Time limit: called before each piece of a search; False ends it, and keeps what was found until then."""

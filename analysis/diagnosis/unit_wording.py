@@ -9,16 +9,17 @@ from analysis.wording import typeset
 
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"), (1e9, "G"))
 """SI prefixes with their factors."""
-_KEPT = (0.01, 1e4)
-"""Between these a unit needs no prefix, unless people always give it one."""
+_RANGE_WITHOUT_PREFIX = (0.01, 1e4)
+"""Values within this range are shown in the unit itself."""
 _ALWAYS_PREFIXED = ("m", "s", "m/s", "N m")
+"""Units for which a prefix is usual within that range too: 54 mm, not 0.054 m."""
 _NEVER_PREFIXED = ("1", "deg", "ppm", "kg", "kg m^2")
 _NO_PREFIX = re.compile(r"1/|[A-Za-z]+\^")
-"""A power at the begin would raise the prefix, too."""
+"""Units that begin with a reciprocal or a power: a prefix would be raised to it as well."""
 _RAISED = {"^2": "²", "^3": "³"}
 _SYMBOLS = {"deg": "°"}
 _MOST_DIGITS, _DIGITS = 5, 3
-"""Most digits of a number, and its usual significant digits."""
+"""Most significant digits of a number, and the usual ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +32,7 @@ class Scale:
 
 _INERTIAS = (Scale(1.0, "kg m²"), Scale(1e4, "kg cm²"), Scale(1e7, "g cm²"))
 _LEAST_INERTIA = 0.1
-"""In the unit that is shown, but in the smallest."""
+"""Smallest value shown in a unit of inertia; below it the next smaller unit is used."""
 
 
 def scale_of(unit: str, magnitude: float) -> Scale:
@@ -41,8 +42,8 @@ def scale_of(unit: str, magnitude: float) -> Scale:
         return Scale(1.0, "kg") if size >= 1 or size == 0 else Scale(1e3, "g")
     if unit == "kg m^2":
         return next((scale for scale in _INERTIAS if size * scale.factor >= _LEAST_INERTIA or size == 0), _INERTIAS[-1])
-    kept = _KEPT[0] <= size < _KEPT[1] and unit not in _ALWAYS_PREFIXED
-    if kept or size == 0 or unit in _NEVER_PREFIXED or _NO_PREFIX.match(unit):
+    in_range = _RANGE_WITHOUT_PREFIX[0] <= size < _RANGE_WITHOUT_PREFIX[1] and unit not in _ALWAYS_PREFIXED
+    if in_range or size == 0 or unit in _NEVER_PREFIXED or _NO_PREFIX.match(unit):
         return Scale(1.0, typeset_unit(unit))
     factor, prefix = max((prefixed for prefixed in _PREFIXES if prefixed[0] <= size * (1 + 1e-9)), default=_PREFIXES[0])
     return Scale(1 / factor, prefix + typeset_unit(unit))

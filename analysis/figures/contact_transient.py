@@ -13,7 +13,7 @@ Play = tuple[str, FloatArray, FloatArray]
 
 
 def contact_picture(normal: FloatArray, sample_rate_hz: float, wanted: FloatArray, *plays: Play) -> Picture:
-    """normal: (3,), of length 1. wanted: (N, 3), m/s^2."""
+    """Figure of a transient played at a contact. normal: (3,), of length 1. wanted: (N, 3), m/s^2."""
     words = ", ".join(f"{part:.2g}" for part in normal)
     return Picture(
         name="contact",

@@ -28,7 +28,8 @@ _Shade = tuple[str, float]
 def frequency_bands_picture(
     response: FrequencyResponse, onset: CouplingOnset, bands: Sequence[FrequencyBand], direction_limit_hz: float
 ) -> Picture:
-    """response: with inputs and outputs in one frame. bands: by `frequency_bands`, at least one."""
+    """Figure of coupling and direction perception by frequency band. response: with inputs and outputs in one frame.
+    bands: by `frequency_bands`, at least one."""
     return Picture(
         name="frequency-bands",
         title="Frequency bands",

@@ -28,7 +28,8 @@ _COLOUR_OF = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "positi
 
 
 def look_pictures(found: Overview, place: int) -> tuple[Picture, ...]:
-    """place: of the recording among those of the page, from 1; part of the pictures' names."""
+    """All figures of one recording. place: of the recording among those of the page, from 1; part of the pictures'
+    names."""
     pictures = [_signals_picture(found, f"signals-{place}")]
     if found.spectra is not None:
         pictures.append(_spectra_picture(found, f"spectra-{place}"))

@@ -11,7 +11,7 @@ from equalizer.identification.state_space.order_report import VISIBLE, OrderRepo
 
 
 def model_order_picture(report: OrderReport, chosen: int) -> Picture:
-    """chosen: the order of the model that was made."""
+    """Figure of the compared model orders. chosen: the order of the model that was made."""
     return Picture(
         name="model-order",
         title="What the order of the model buys and costs",

@@ -18,6 +18,7 @@ _COLOURS = (BLUE, VERMILLION, GREEN)
 _LOWEST_DB, _HIGHEST_DB = -55.0, 12.0
 """Range of the vertical axis."""
 _TICKS_HZ = (5, 10, 20, 35)
+"""Ticks of the frequency axis, as in the published figure."""
 
 
 def played_responses_picture(rows: Sequence[PlayedResponse]) -> Picture:

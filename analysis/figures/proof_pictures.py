@@ -1,4 +1,8 @@
-"""Figures of a bank of concealed effects: confusion, detection thresholds, and calibration of probabilities."""
+"""Figures of the blind test (`hapteq prove`): detection thresholds, detection by effect size, confusion, reliability.
+
+The outcomes are those of a bank of simulated devices with concealed effects. The *oracle* of the figures is an ideal
+observer that knows the effect: it compares the device with and without it, with no model to be re-tuned.
+"""
 
 from collections.abc import Sequence
 
@@ -7,12 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from analysis.evaluation.proof.calibration import Calibration
-from analysis.evaluation.proof.detection import Strip, detection_strips, shares_by_size
+from analysis.evaluation.proof.detection import EffectDraws, detection_strips, shares_by_size
 from analysis.evaluation.proof.outcome import Outcome
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes, ratio_ticks
 
 MARKS = {"right": ("o", BLUE), "in the set": ("D", ORANGE), "missed": ("X", VERMILLION), "invisible": (".", GREY)}
+"""Marker and colour of each outcome of a single effect (`Outcome`)."""
 NO_ANSWER = "no name"
 
 
@@ -28,7 +33,8 @@ def proof_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tup
     return tuple(pictures)
 
 
-def _strips_picture(strips: Sequence[Strip]) -> Picture:
+def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
+    """A row per effect: the outcome of each draw over its strength."""
     figure = new_figure(8.8, 1.3 + 0.21 * len(strips))
     axes = figure.add_subplot()
     plain_axes(axes)
@@ -43,21 +49,23 @@ def _strips_picture(strips: Sequence[Strip]) -> Picture:
     axes.set_xlim(-0.03, 1.03)
     axes.set_xlabel("strength, from the weakest that is drawn to the strongest (logarithmic)")
     handles = [Line2D([], [], marker=m, color=c, linestyle="", label=how) for how, (m, c) in MARKS.items()]
-    handles.append(Line2D([], [], marker="|", color=BLACK, linestyle="", markersize=9, label="an oracle sees it"))
+    handles.append(
+        Line2D([], [], marker="|", color=BLACK, linestyle="", markersize=9, label="ideal observer detects it")
+    )
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
     return Picture(
         "detection", "From which strength on an effect is named",
         "Each mark is a device with one concealed effect. Invisible: the re-tuned model errs by at most 1.25 times "
         "the noise, so there is nothing to be explained; in the set: named as inseparable from what was named. Bars: "
-        "from here on an oracle, who plays the same device with and without the effect, sees as much, before a "
-        "re-tuned model hides part of it (a line through the logarithms of what the draws add).",
+        "strength from which an ideal observer, who compares the same device with and without the effect, detects it: "
+        "re-tuning hides nothing from it (line fit to the logarithms of the changes that the effects cause).",
         figure,
         alternative=" ".join(f"{s.effect}: {', '.join(f'{x:.2f} {how}' for x, how in s.draws)}." for s in strips),
     )  # fmt: skip
 
 
 def _size_picture(singles: Sequence[Outcome]) -> Picture:
-    """All effects together, against what an oracle that knows the truth sees."""
+    """Share named right of all effects together, over the size of the change that they cause."""
     figure = new_figure(7.4, 3.6)
     axes = figure.add_subplot()
     plain_axes(axes)
@@ -69,26 +77,27 @@ def _size_picture(singles: Sequence[Outcome]) -> Picture:
     axes.set_ylim(-0.02, 1.02)
     if max(at) > min(at):
         ratio_ticks(axes.xaxis, min(at), max(at))
-    axes.set_xlabel("what the effect changes of the readings: rms over the noise's, worst channel")
+    axes.set_xlabel("change of the readings by the effect: rms over the noise's, worst channel")
     axes.set_ylabel("share named right")
     return Picture(
         "detection-by-size", "How large an effect must be",
-        "All effects together, in parts of equal count; bars are Wilson's 95 % intervals. The abscissa is known to an "
-        "oracle alone: the same device with and without the effect, before a re-tuned model hides part of it.",
+        "All effects together, in bins of equal count; bars are Wilson's 95 % intervals. The abscissa compares the "
+        "same device with and without the effect, before a re-tuned model hides part of it.",
         figure,
         alternative=" ".join(f"{part.adds:.3g}: {100 * part.right:.0f} % of {part.of}." for part in parts),
     )  # fmt: skip
 
 
 def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
-    seen = [single for single in singles if single.detectable]
-    answers = [item.named_names[0] if item.named else NO_ANSWER for item in seen]
-    wrong = {name for item, name in zip(seen, answers, strict=True) if name not in (NO_ANSWER, item.names[0])}
-    names = sorted({item.names[0] for item in seen} | wrong)
+    """Concealed effects (rows) against the first named (columns)."""
+    detectable = [outcome for outcome in singles if outcome.detectable]
+    answers = [outcome.named_names[0] if outcome.named else NO_ANSWER for outcome in detectable]
+    pairs = [(outcome.names[0], answer) for outcome, answer in zip(detectable, answers, strict=True)]
+    names = sorted({true for true, _ in pairs} | {answer for _, answer in pairs if answer != NO_ANSWER})
     columns = [*names, NO_ANSWER]
     counts = np.zeros((len(names), len(columns)))
-    for each, name in zip(seen, answers, strict=True):
-        counts[names.index(each.names[0]), columns.index(name)] += 1
+    for true, answer in pairs:
+        counts[names.index(true), columns.index(answer)] += 1
     figure = new_figure(9.6, 2.2 + 0.23 * len(names))
     axes = figure.add_subplot()
     _draw_counts(axes, counts)
@@ -97,9 +106,9 @@ def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
     axes.set_xlabel("named first")
     axes.set_ylabel("concealed")
     return Picture(
-        "confusion", "What was taken for what",
+        "confusion", "Confusion matrix",
         "Devices with one concealed effect that shows; blue is right, red is not.", figure,
-        alternative=" ".join(f"{item.names[0]} named {name}." for item, name in zip(seen, answers, strict=True)),
+        alternative=" ".join(f"{true} named {answer}." for true, answer in pairs),
     )  # fmt: skip
 
 
@@ -134,8 +143,8 @@ def _reliability_picture(calibration: Calibration) -> Picture:
     axes.set_xlabel("stated probability")
     axes.set_ylabel("share that is right")
     return Picture(
-        "reliability", "Whether probabilities mean what they say",
-        "All named effects in bins of equal count, with Wilson's 95 % intervals. On the dashed line they mean it.",
+        "reliability", "Reliability of stated probabilities",
+        "All named effects in bins of equal count, with Wilson's 95 % intervals. Dashed: perfect calibration.",
         figure,
         alternative=" ".join(f"{p.stated:.2f} stated, {p.right:.2f} right, of {p.of}." for p in calibration.bins),
     )  # fmt: skip

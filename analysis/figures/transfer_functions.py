@@ -14,8 +14,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, draw_no_data_note, new_figure, plain_axes
 from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
 from equalizer.identification.frequency_response.octave_bins import OctaveBins, octave_bins
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _BIN_OCTAVES = 1 / 24
 """Width of a bin in which lines are averaged for drawing, octaves."""
@@ -36,7 +35,7 @@ class ResponseCurve:
 def transfer_functions_picture(
     response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
 ) -> Picture:
-    """band_hz: marked in every panel, as the band of a fit."""
+    """Figure of all transfer functions. band_hz: marked in every panel, as the band of a fit."""
     return Picture(
         name="transfer-functions",
         title="Transfer functions of all channels",

@@ -7,8 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.look.channels import Channel, Stretch
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _WINDOWS = 12
 """Number of half-overlapping windows to aim for; with so many, half of a coherence of 0.1 is chance."""

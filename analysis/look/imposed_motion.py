@@ -78,7 +78,7 @@ def _misfit(values: FloatArray, count: int) -> float:
     kept = np.full(len(at), True)
     for _ in range(3):
         found = np.linalg.lstsq(terms[kept], squared[kept], rcond=None)[0]
-        left = np.abs(squared - terms @ found)
-        kept = left <= np.quantile(left, _KEPT)
+        residual = np.abs(squared - terms @ found)
+        kept = residual <= np.quantile(residual, _KEPT)
     scale = float(np.mean(squared))
-    return float(np.mean(left[kept])) / scale if scale > 0 else 0.0
+    return float(np.mean(residual[kept])) / scale if scale > 0 else 0.0

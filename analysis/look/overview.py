@@ -110,7 +110,7 @@ class Overview(Summarised):
 
 
 def overview(name: str, recording: Recording) -> Overview:
-    """name: of the file, for tables and figures."""
+    """Channels, spectra, levels and checks of a recording. name: of the file, for tables and figures."""
     channels, stretches, rate_hz = channels_of(recording), stretches_of(recording), recording.sample_rate_hz
     spectra = cross_spectra(channels, stretches, rate_hz)
     bands = find_driven_bands(spectra, channels) if spectra else ()

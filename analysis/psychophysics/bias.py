@@ -31,7 +31,8 @@ class ResponseBias:
 
 
 def response_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> ResponseBias | None:
-    """directions_shown: 1 or 2 per trial. None when one of the directions was never shown."""
+    """Sensitivity d' and criterion of identification answers. directions_shown: 1 or 2 per trial. None when one of the
+    directions was never shown."""
     hits = [right for shown, right in zip(directions_shown, correct, strict=True) if shown == 1]
     false_alarms = [not right for shown, right in zip(directions_shown, correct, strict=True) if shown == 2]
     if not hits or not false_alarms:

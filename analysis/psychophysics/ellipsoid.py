@@ -119,7 +119,8 @@ def direction_frame(unit_vector: FloatArray) -> FloatArray:
 
 
 def moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
-    """samples: (n, 3) in the test direction's frame. The mean is taken off: gravity and offset are no motion."""
+    """Ellipsoid of second moments of a motion. samples: (n, 3) in the test direction's frame. The mean is taken off:
+    gravity and offset are no motion."""
     moving = samples - samples.mean(axis=0)
     mean_square = moving.T @ moving / len(moving)
     eigenvalues, vectors = np.linalg.eigh(mean_square)
@@ -136,7 +137,8 @@ def moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
 
 
 def phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency_hz: float) -> PhasorEllipse:
-    """samples: (n, 3) in the test direction's frame, one period at least."""
+    """Ellipse that the fundamental of a motion draws. samples: (n, 3) in the test direction's frame, one period at
+    least."""
     harmonics = max(1, min(HARMONICS, math.ceil(sample_rate_hz / 2 / frequency_hz) - 1))
     tones = phasors(samples, sample_rate_hz, frequency_hz, harmonics)
     fundamental = tones[0]

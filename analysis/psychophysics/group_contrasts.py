@@ -18,7 +18,7 @@ from equalizer.signals.signal import FloatArray
 EQUIVALENCE_DB = 2.0
 """Differences within this are called equivalent: two of the staircase's small steps, half of its large one."""
 EQUIVALENCE_UP_TO_HZ = 25.0
-"""Where the published thresholds are alike, and no peak is cut by the cap."""
+"""Highest frequency (Hz) tested for equivalence: up to it the published thresholds are alike, and none is censored."""
 
 ROUNDING_DB = 1e-9
 """Differences closer than this are equal: sums of the same steps in another order."""

@@ -7,6 +7,8 @@ from protocols.trial import Trial
 
 
 class Population(Enum):
+    """Who answered a trial, and whether anything could be felt."""
+
     PEOPLE = "people"
     SIMULATED = "simulated participants"
     NOT_FELT = "people who felt nothing"

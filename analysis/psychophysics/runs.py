@@ -11,8 +11,6 @@ from protocols.trial import AT_WILL, Phase, Trial, TrialStatus
 
 LEVEL_TOLERANCE = 1e-4
 """Relative: a thousandth of a dB. Covers rounding in a table, and is far below any step."""
-
-
 ROUNDING_DB = 1e-3
 """Rounding in a table, as `LEVEL_TOLERANCE`."""
 
@@ -45,9 +43,8 @@ class Run:
 def recompute_runs(
     trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = Phase.TEST, rove_db: float = 0.0
 ) -> tuple[Run, ...]:
-    """rove_db: range from which the protocol draws levels around the staircase's.
-
-    All runs of one phase, in the order in which they first occur.
+    """All runs of one phase, in the order in which they first occur. rove_db: range from which the protocol draws
+    levels around the staircase's.
 
     Catch trials lie within test runs, with trial numbers of their own, and move nothing. Practice runs follow no
     staircase: a caller who asks for TRAINING leaves them out of `trials` (see `analysis.psychophysics.study_analysis`).

@@ -15,7 +15,7 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
 
 FEW_PARTICIPANTS = 5
-"""Below this many, means and their comparison say little about people in general."""
+"""Number of participants below which means and their comparison say little about people in general."""
 STRONG_BIAS = 0.6
 """Criterion beyond which a liking for one answer costs a staircase four in a hundred right answers. An observer
 without any exceeds it by chance in about one of 250 runs."""
@@ -32,7 +32,7 @@ REPEAT_SD_DB = 2.4
 def study_warnings(
     trials: Sequence[Trial], rows: Sequence[Threshold], table: ThresholdTable, protocol: StudyProtocol
 ) -> tuple[str, ...]:
-    """trials: of the test phase. rows, table: what was computed from them."""
+    """All warnings about a study's results. trials: of the test phase. rows, table: what was computed from them."""
     if not rows:
         return ("No test trial is there, so there is no threshold of direction.",)
     candidates = (

@@ -56,8 +56,8 @@ def comparison_text(
     table: ThresholdTable,
     rule: StaircaseRule,
 ) -> str:
-    """means: contrasts of reversal means in dB, against the same frequency as those of the primary analysis. rule: the
-    staircase that was played."""
+    """Differences between the published and the primary analysis, in sentences. means: contrasts of reversal means in
+    dB, against the same frequency as those of the primary analysis. rule: the staircase that was played."""
     if primary is None:
         return (
             "The hierarchical model needs answers of two participants, at two frequencies; these data have fewer, so "

@@ -8,7 +8,8 @@ NAMES = {"hierarchical": "hierarchical model of all answers", "published": "publ
 
 
 def declared_section(declaration: str, result: DeclaredResult) -> Section:
-    """declaration: what was declared and what was not, in words. Where nothing was, the section is this alone."""
+    """The section on the declared result. declaration: what was declared and what was not, in words. Where nothing was,
+    the section is this alone."""
     heading = "The declared result"
     if not _anything_declared(result):
         return Section(heading, paragraphs=(declaration,))

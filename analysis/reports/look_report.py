@@ -13,7 +13,7 @@ from analysis.wording import typeset, untimed_text
 def render_look_report(
     found: Sequence[Overview], pictures: Sequence[tuple[Picture, ...]], provenance: Mapping[str, str], generated: str
 ) -> str:
-    """pictures: of each recording, as `pictures_of` gives them."""
+    """The page about recordings. pictures: of each recording, as `pictures_of` gives them."""
     wrong = [(each.name, check) for each in found for check in each.checks if check.level == "wrong"]
     sections = [
         section for each, drawn in zip(found, pictures, strict=True) for section in _sections(each, drawn, found)

@@ -88,12 +88,12 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     kept = _weakest_and_strongest_part(evidence, axis)
     alone = float(np.std(evidence.command[kept[-1], axis])) / motor / (2 * np.pi * 10.0) ** 2
     floor = evidence.noise**2 / (0.5 * evidence.sample_rate_hz)
-    left = [_spectrum(evidence, (evidence.response - evidence.predicted)[part]) for part in kept]
+    residuals = [_spectrum(evidence, (evidence.response - evidence.predicted)[part]) for part in kept]
     linear = [_simulate_part(evidence, axis, None, part) for part in kept]
     tried = []
     for gap in (GAPS * alone).tolist():
         off = 0.0
-        for part, missed, smooth in zip(kept, left, linear, strict=True):
+        for part, missed, smooth in zip(kept, residuals, linear, strict=True):
             rattled = _spectrum(evidence, _simulate_part(evidence, axis, {"gap": gap, **rest}, part) - smooth)
             off += float(np.mean(np.log((rattled + floor) / (missed + 0.1 * floor)) ** 2))
         tried.append((off, gap))

@@ -169,7 +169,7 @@ class Effect:
 _living: WeakValueDictionary[int, Effect] = WeakValueDictionary()
 
 
-def living_effects() -> dict[int, Effect]:
+def effects_by_address() -> dict[int, Effect]:
     """All effects that exist, by address (`id`): those of the catalogue and those of discovered laws.
 
     Effects hold functions, which cannot be sent to another process; a forked process has them at the same addresses.

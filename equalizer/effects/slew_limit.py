@@ -60,8 +60,8 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 def _has_unexplained_error(evidence: Evidence) -> bool:
     """Whether any channel errs by more than its noise."""
-    left = (evidence.response - evidence.predicted)[evidence.used > 0]
-    return bool((np.sqrt(np.nanmean(left**2, axis=0)) > ERRS * evidence.noise).any())
+    residual = (evidence.response - evidence.predicted)[evidence.used > 0]
+    return bool((np.sqrt(np.nanmean(residual**2, axis=0)) > ERRS * evidence.noise).any())
 
 
 EFFECT = Effect(

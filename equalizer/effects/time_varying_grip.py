@@ -1,4 +1,9 @@
-"""Time-varying grip: damping and stiffness to the ground change sinusoidally with time."""
+"""Time-varying grip: damping and stiffness to the ground change sinusoidally with time.
+
+    F = -depth sin(2 pi rate_hz t + phase) (D v + stiffness_share K x)
+
+D and K are the damping and stiffness of the model to the ground along the axis: those of the hand, mainly.
+"""
 
 import numpy as np
 from scipy.fft import fft, ifft, next_fast_len
@@ -10,22 +15,24 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, regress_beside_linear
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 FASTEST_HZ, STARTS = 15.0, 2
-"""Fastest variation of a grip (a tremor is slower), and number of suggestions."""
-_FINER = 16
-"""Zero padding of the spectrum: points per line."""
+"""Fastest variation of a grip that is searched (tremor is slower: 8 to 12 Hz), and number of starting values."""
+_POINTS_PER_LINE = 16
+"""Zero padding of the spectrum, in points per line: the rate is then found to a sixteenth of a line."""
+_LEAST_DENOMINATOR = 0.2
+"""Least denominator of the implicit step: keeps it positive where negative damping is strong within a step."""
 
 
 @compile_law
 def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """The mean over the step, in which the motion at its end depends on the force."""
-    swing = numbers[1] * np.sin(numbers[0] * (at[TIME_S] + 0.5 * at[STEP_S]) + numbers[2])
-    damping, stiffness = swing * numbers[3], swing * numbers[4]
+    """The mean force over a step by the trapezoidal rule: F = -(d (v + v1) + k (x + x1)) / 2. The state x1, v1 at the
+    end of the step is that without the force, plus the force times what 1 N adds."""
+    modulation = numbers[1] * np.sin(numbers[0] * (at[TIME_S] + 0.5 * at[STEP_S]) + numbers[2])
+    damping, stiffness = modulation * numbers[3], modulation * numbers[4]
     force = -0.5 * (damping * (at[V] + at[V_FREE]) + stiffness * (at[X] + at[X_FREE]))
-    return float(force / max(1 + 0.5 * (damping * at[V_PER_N] + stiffness * at[X_PER_N]), 0.2))
+    return float(force / max(1 + 0.5 * (damping * at[V_PER_N] + stiffness * at[X_PER_N]), _LEAST_DENOMINATOR))
 
 
 def value_to_ground(matrix: FloatArray, axes: FloatArray, axis: int) -> float:
@@ -50,18 +57,22 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     sites = range(evidence.model.inputs) if axis == ALL_SITES else (axis,)
     n, rate = len(evidence.command), evidence.sample_rate_hz
-    force, drag = np.zeros((n, len(sites))), np.zeros((n, len(sites)))
-    pull = np.zeros((n, len(sites)))
+    force, damping_force = np.zeros((n, len(sites))), np.zeros((n, len(sites)))
+    spring_force = np.zeros((n, len(sites)))
     axes, used = driven_axes(evidence.model), evidence.used > 0
     for column, site in enumerate(sites):
         force[used, column] = regress_beside_linear(axis_motion(evidence, site)).force
-        drag[used, column] = -value_to_ground(evidence.model.damping, axes, site) * evidence.axis_velocity[used, site]
-        pull[used, column] = -value_to_ground(evidence.model.stiffness, axes, site) * evidence.axis_position[used, site]
+        damping_force[used, column] = (
+            -value_to_ground(evidence.model.damping, axes, site) * evidence.axis_velocity[used, site]
+        )
+        spring_force[used, column] = (
+            -value_to_ground(evidence.model.stiffness, axes, site) * evidence.axis_position[used, site]
+        )
     found = []
-    for rate_hz in _likely_rates(force, drag, rate):
+    for rate_hz in _likely_rates(force, damping_force, rate):
         angle = 2 * np.pi * rate_hz * np.arange(n)[:, None] / rate
-        shapes = [part * wave for part in (drag, pull) for wave in (np.sin(angle), np.cos(angle))]
-        fit = PartialRegression(force.ravel(), np.column_stack([drag.ravel(), pull.ravel()])).fit(
+        shapes = [part * wave for part in (damping_force, spring_force) for wave in (np.sin(angle), np.cos(angle))]
+        fit = PartialRegression(force.ravel(), np.column_stack([damping_force.ravel(), spring_force.ravel()])).fit(
             *(s.ravel() for s in shapes)
         )
         found.append((fit.explained, _grip_values(rate_hz, fit.strengths)))
@@ -88,15 +99,15 @@ def _slow_lines(samples: FloatArray, size: int, count: int) -> ComplexArray:
     return np.asarray(mixed[n - 1 : n - 1 + count] * chirp[:count])
 
 
-def _likely_rates(force: FloatArray, drag: FloatArray, rate: float) -> list[float]:
-    """Likeliest modulation frequencies in Hz: regression of the missing force on the modulated drag, at every
+def _likely_rates(force: FloatArray, damping_force: FloatArray, rate: float) -> list[float]:
+    """Likeliest modulation frequencies in Hz: regression of the missing force on the modulated damping force, at every
     frequency."""
     n = len(force)
-    size = _FINER * n
-    # Its square is needed at twice as high a line, which a slow clock does not hold.
+    size = _POINTS_PER_LINE * n
+    # The square is needed at twice the frequency, which must stay below half of the sampling rate.
     last = min(int(FASTEST_HZ / rate * size), size // 4)
-    against = np.conj(_slow_lines(np.sum(force * drag, axis=1), size, last + 1))
-    square = np.conj(_slow_lines(np.sum(drag**2, axis=1), size, 2 * last + 1))
+    against = np.conj(_slow_lines(np.sum(force * damping_force, axis=1), size, last + 1))
+    square = np.conj(_slow_lines(np.sum(damping_force**2, axis=1), size, 2 * last + 1))
     twice, whole = square[: 2 * last + 1 : 2], float(square[0].real)
     normal = np.empty((last + 1, 3, 3))
     normal[:, 0, 0] = whole
@@ -107,12 +118,12 @@ def _likely_rates(force: FloatArray, drag: FloatArray, rate: float) -> list[floa
     columns = np.stack([np.full(last + 1, against[0].real), against.imag, against.real], axis=1)
     normal += 1e-6 * whole * np.eye(3)
     power = np.sum(columns * np.linalg.solve(normal, columns[:, :, None])[:, :, 0], axis=1)
-    power[:_FINER] = -np.inf
+    power[:_POINTS_PER_LINE] = -np.inf
     rates = []
     for _ in range(STARTS):
         line = int(np.argmax(power))
         rates.append(line * rate / size)
-        power[max(line - 2 * _FINER, 0) : line + 2 * _FINER + 1] = -np.inf
+        power[max(line - 2 * _POINTS_PER_LINE, 0) : line + 2 * _POINTS_PER_LINE + 1] = -np.inf
     return rates
 
 

@@ -50,7 +50,7 @@ def _binary(code: int, left: float, right: float) -> float:
 
 
 @njit(inline="always")
-def _unary(code: int, operand: float) -> float:  # noqa: C901 - a table, in the only form that compiles to a jump
+def _apply_unary(code: int, operand: float) -> float:  # noqa: C901 - a table, in the only form that compiles to a jump
     if code == _NEGATE:
         return -operand
     if code == _ABS:
@@ -102,7 +102,7 @@ def _integral(signal: float, memory: FloatArray, at: int, phase: int, step_s: fl
 
 
 @njit(inline="always")
-def _play(signal: float, half_width: float, memory: FloatArray, at: int, phase: int) -> float:
+def _apply_play(signal: float, half_width: float, memory: FloatArray, at: int, phase: int) -> float:
     width = max(half_width, 0.0)
     follows = min(max(memory[at], signal - width), signal + width)
     memory[at + 1] = follows
@@ -179,7 +179,7 @@ def _run_with_memory(  # noqa: PLR0913 - a kernel takes flat arrays
     if code == _LAG:
         return float(_lag(signal, number, memory, at, phase, step_s))
     if code == _PLAY:
-        return float(_play(signal, number, memory, at, phase))
+        return float(_apply_play(signal, number, memory, at, phase))
     if code == _DELAY:
         return float(_delay(signal, number, memory, at, phase, time_s))
     return float(_integral(signal, memory, at, phase, step_s))
@@ -207,7 +207,7 @@ def run(  # noqa: PLR0913 - a kernel takes flat arrays
             top -= 1
             stack[top] = _binary(code, stack[top], stack[top + 1])
         elif code < _LAG:
-            stack[top] = _unary(code, stack[top])
+            stack[top] = _apply_unary(code, stack[top])
         else:
             top -= code != _INTEGRAL
             stack[top] = _run_with_memory(

@@ -13,7 +13,8 @@ KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """Raises LawError where the formula is not in the language, or its numbers do not fit it."""
+    """A formula with free parameters, and what it acts on. Raises LawError where the formula is not in the language, or
+    its numbers do not fit it."""
 
     expression: str
     """Template with free numbers p0, p1, …: '-p0*abs(vy)**p1*sign(vy)'. Literal numbers in it are part of the form."""

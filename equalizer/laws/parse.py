@@ -59,7 +59,7 @@ class _Reader:
                 return Apply(_OPERATORS[type(operator)], (self.read(left), self.read(right)))
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                 return self._call(node, name, arguments)
-        raise LawError(f"{self._where(node)} is not part of the language of laws; {ALLOWED}")
+        raise LawError(f"{self._position_text(node)} is not part of the language of laws; {ALLOWED}")
 
     def _number(self, node: ast.expr, value: float) -> Node:
         try:
@@ -67,7 +67,7 @@ class _Reader:
         except OverflowError:
             number = np.inf
         if not np.isfinite(number):
-            raise LawError(f"{self._where(node)} is larger than any number")
+            raise LawError(f"{self._position_text(node)} is larger than any number")
         if isinstance(value, int) or self.template:
             return Number(number)
         self.numbers.append(number)
@@ -78,26 +78,26 @@ class _Reader:
             return Variable("pi")
         if free := re.fullmatch(r"p(\d{1,3})", name):
             if not self.template:
-                raise LawError(f"{self._where(node)} stands for a free number; write the number itself")
+                raise LawError(f"{self._position_text(node)} stands for a free number; write the number itself")
             return Free(int(free[1]))
         if name in FUNCTIONS:
-            raise LawError(f"{self._where(node)} is a function; it takes its arguments in parentheses")
+            raise LawError(f"{self._position_text(node)} is a function; it takes its arguments in parentheses")
         return Variable(name)
 
     def _call(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
         if name not in FUNCTIONS:
             close = get_close_matches(name[:60], FUNCTIONS, n=1)
             hint = f" (did you mean '{close[0]}'?)" if close else ""
-            raise LawError(f"{self._where(node)}: there is no function '{name}'{hint}; {ALLOWED}")
+            raise LawError(f"{self._position_text(node)}: there is no function '{name}'{hint}; {ALLOWED}")
         if len(arguments) != FUNCTIONS[name]:
             wanted = f"{FUNCTIONS[name]} argument{'s' if FUNCTIONS[name] > 1 else ''}"
-            raise LawError(f"{self._where(node)}: {name} takes {wanted}, not {len(arguments)}")
+            raise LawError(f"{self._position_text(node)}: {name} takes {wanted}, not {len(arguments)}")
         parts = tuple(self.read(argument) for argument in arguments)
         if name in MEMORY[:3] and any(isinstance(leaf, Variable) and leaf.name != "pi" for leaf in _leaves(parts[1])):
-            raise LawError(f"{self._where(arguments[1])}: the second argument of {name} must be a constant")
+            raise LawError(f"{self._position_text(arguments[1])}: the second argument of {name} must be a constant")
         return Apply(name, parts)
 
-    def _where(self, node: ast.expr) -> str:
+    def _position_text(self, node: ast.expr) -> str:
         part = ast.get_source_segment(self.text, node) or self.text
         shown = part if len(part) <= 40 else f"{part[:40]}…"
         return f"'{shown}' at character {_column(self.text, node) + 1}"

@@ -43,7 +43,8 @@ class Program:
 
 
 def program_of(tree: Node, signals: Mapping[str, int]) -> Program:
-    """signals: column of each signal. Raises LawError for an unknown signal, and for a formula that is too deep."""
+    """Compile a formula's tree for the stack machine. signals: column of each signal. Raises LawError for an unknown
+    signal, and for a formula that is too deep."""
     program = _append_formula(tree, Program(np.empty((0, 2)), (), 1), signals)
     _check_depth(program.codes[:, 0])
     return program

@@ -76,7 +76,8 @@ class _Reader:
         self.found: dict[int, Dimension] = {}
 
     def dimension_of(self, node: Node, literal: Dimension | None = NONE) -> Dimension | None:
-        """literal: dimension of numbers in the formula; None = not known, since a number may have a unit of its own."""
+        """Dimension of an expression; None where it is not known. literal: dimension of numbers in the formula; None =
+        not known, since a number may have a unit of its own."""
         match node:
             case Number() | Variable("pi"):
                 return literal

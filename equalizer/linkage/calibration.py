@@ -115,7 +115,8 @@ def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
 
 
 def difference_problems(difference: float) -> Iterator[str]:
-    """difference: relative, of J from finite differences."""
+    """Problems of a Jacobian against finite differences of positions. difference: relative, of J from finite
+    differences."""
     if not 0 <= difference <= MOST_DIFFERENCE:
         yield (
             f"the Jacobian differs from finite differences of its own positions by {difference:.0%}; "

@@ -55,7 +55,7 @@ def symmetric_grid(azimuths: FloatArray, radius_m: float, depth_m: float) -> Flo
 
 
 def beside(position_m: FloatArray) -> FloatArray:
-    """Positions (6, 3) a step before and behind along x, y, z: for `jacobian_by_differences`."""
+    """Positions (6, 3) a step before and behind along x, y, z: for `jacobian`."""
     steps: FloatArray = STEP_M * np.vstack([np.eye(3), -np.eye(3)])
     return position_m + steps
 

@@ -16,7 +16,7 @@ WARN_FROM = 0.02
 NEAR_M = 1e-6
 """Distance below which two positions are the same."""
 ODD_SHARE = 0.5
-"""Below this share of the others' asymmetry a line is one that holds: its own arm is the odd one."""
+"""Share of the others' asymmetry below which a mirror line is valid, so that its own arm is the one that differs."""
 UPRIGHT = 1e-3
 """Largest y component of a line's direction for it to count as upright: gravity then lies in its mirror plane."""
 

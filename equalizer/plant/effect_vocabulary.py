@@ -82,7 +82,7 @@ MATRIX_UNITS = {"mass": _mass("mass"), "damping": _damping("damping"), "stiffnes
 
 
 def matrix_unit(part: str, system: UnitSystem) -> str:
-    """part: mass, damping or stiffness."""
+    """Unit of a model's mass, damping or stiffness matrix. part: mass, damping or stiffness."""
     return MATRIX_UNITS[part].unit_in(system, "1")
 
 

@@ -34,7 +34,7 @@ Numbers = TypeVar("Numbers", SensorLimits, ActuatorLimits, Tolerance)
 
 
 def parse_mechanical_model(text: str) -> MechanicalModel:
-    """Raises MechanicalModelError with every problem found, in words."""
+    """Parse a mechanical model. Raises MechanicalModelError with every problem found, in words."""
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:

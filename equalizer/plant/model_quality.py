@@ -49,8 +49,8 @@ def model_quality(
     remarks: tuple[str, ...] = (),
     most_misfit: float = 0.0,
 ) -> ModelQuality:
-    """held_out: error, noise, seconds; the stated error is at least the held-out one. most_misfit: misfit that the
-    noise of the fitted lines may hide."""
+    """The quality of a model from its misfit, its scatter and its held-out error. held_out: error, noise, seconds; the
+    stated error is at least the held-out one. most_misfit: misfit that the noise of the fitted lines may hide."""
     own = float(np.hypot(max(misfit_error, most_misfit), scatter_error or 0.0))
     error, noise, seconds = held_out or (None, None, None)
     return ModelQuality(max(own, error or 0.0), misfit_error, scatter_error, error, noise, seconds, remarks)

@@ -4,8 +4,7 @@ import numpy as np
 from scipy.linalg import schur
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def model_response(model: IdentifiedModel, frequency_hz: FloatArray) -> ComplexArray:

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 ORDER = 4
 """Order of the Butterworth low pass, applied forwards and backwards (Gautier, Vandanjon and Pressé 1994)."""

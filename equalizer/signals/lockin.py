@@ -1,11 +1,8 @@
 """Lock-in: amplitude and phase of a known frequency in noisy samples, by least squares."""
 
 import numpy as np
-import numpy.typing as npt
 
-from equalizer.signals.signal import FloatArray
-
-ComplexArray = npt.NDArray[np.complex128]
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def phasors(samples: FloatArray, sample_rate_hz: float, frequency_hz: float, harmonics: int = 1) -> ComplexArray:

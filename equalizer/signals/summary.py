@@ -1,4 +1,4 @@
-"""How results print: a title and a few rows, in a terminal and in a notebook."""
+"""Short summaries of results, a title and a few rows, in a terminal and in a notebook (`__repr__`, `_repr_html_`)."""
 
 from dataclasses import dataclass
 from html import escape

@@ -117,10 +117,10 @@ QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
     "current": ("A",),
     "time": ("s",),
 }
-"""What the SI unit of a well-known quantity may be; any other word may be used with any unit."""
+"""SI units that a well-known quantity may have; any other word may be used with any unit."""
 
 UNSTATED = "1"
-"""Taken where a file states no unit: its numbers stay as they are."""
+"""Unit where a file states none: its numbers stay as they are."""
 
 LONGEST_UNIT = 100
 """Characters, of a unit that is read in another spelling."""
@@ -149,8 +149,8 @@ def parse_unit(text: str) -> Unit:
 
 
 def check_quantity(quantity: str, unit: Unit) -> None:
-    """Raises UnknownUnitError where a well-known quantity has a unit of something else. A quantity of unknown scale
-    (unit 1) may be any."""
+    """Check that a quantity has a unit of its kind. Raises UnknownUnitError where a well-known quantity has a unit of
+    something else. A quantity of unknown scale (unit 1) may be any."""
     fitting = QUANTITY_UNITS.get(quantity)
     if fitting and unit.si not in (*fitting, UNSTATED):
         raise UnknownUnitError(

@@ -1,4 +1,4 @@
-"""What an analysis promises before data come in: the part of a preregistration that a program can hold."""
+"""Declared analysis: the part of a preregistration that a program can check, fixed before data are collected."""
 
 from typing import Annotated, Literal
 

@@ -1,4 +1,4 @@
-"""What is kept of a trial, and what of it must be there."""
+"""Recording of a trial: what is kept, and the conditions under which its measurement is valid."""
 
 from typing import Annotated
 

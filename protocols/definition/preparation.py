@@ -1,4 +1,4 @@
-"""What happens around the trials: consent, the set-up, a demonstration, practice, the debrief."""
+"""Parts of a sitting around its trials: consent, set-up, demonstration, practice, debrief."""
 
 from typing import Annotated, Literal, Self
 

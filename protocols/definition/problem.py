@@ -1,4 +1,4 @@
-"""What is wrong with one key of a protocol file."""
+"""A problem with one key of a protocol file."""
 
 from dataclasses import dataclass
 

@@ -65,7 +65,7 @@ class SweepSegment:
     role: Role = ""
 
     @model_validator(mode="after")
-    def _upwards(self) -> Self:
+    def _require_rising(self) -> Self:
         _refuse_downwards(self.from_hz, self.to_hz)
         return self
 

@@ -27,6 +27,8 @@ class StepChange(Enum):
 
 @dataclass(frozen=True, config=STRICT)
 class StepPhase:
+    """A step size, and the number of reversals for which it holds."""
+
     step_db: Annotated[float, Field(gt=0, le=20, description="Size of one movement, in dB.")]
     reversals: Annotated[int, Field(ge=1, le=100, description="How many reversals belong to this phase.")]
 

@@ -7,8 +7,8 @@ from typing import Any
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import protocol_values
-from protocols.document.refusals import key_path
 from protocols.document.schema import Node, Place, describe_allowed, node_at, protocol_schema, resolve_reference
+from protocols.document.validation_messages import key_path
 
 Plain = str | int | float | bool | list[Any] | dict[str, str]
 """A table of texts is a value of its own."""

@@ -10,8 +10,8 @@ from pydantic import ValidationError
 from protocols.definition.problem import Problem
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.document.refusals import problems_in, shown
 from protocols.document.schema import ADAPTERS, protocol_schema
+from protocols.document.validation_messages import problems_in, shown
 
 Protocol = StudyProtocol | RecordingProtocol
 

@@ -66,7 +66,7 @@ def lock_to_json(lock: ProtocolLock) -> str:
 
 
 def lock_from_json(text: str) -> ProtocolLock:
-    """Raises LockError that says what is wrong with the document."""
+    """Parse a lock. Raises LockError that says what is wrong with the document."""
     try:
         document: Any = json.loads(text)
     except (ValueError, RecursionError) as error:

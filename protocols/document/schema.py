@@ -46,7 +46,7 @@ def node_at(root: Node, place: Place) -> Node | None:
     """Schema of the value at this place; None where the schema has no such place."""
     node: Node | None = root
     for part in place:
-        node = _below(root, node, part) if node is not None else None
+        node = _child_node(root, node, part) if node is not None else None
     return node
 
 
@@ -93,7 +93,7 @@ def unit_of(key: str) -> str:
     return ""
 
 
-def _below(root: Node, node: Node, part: str | int) -> Node | None:
+def _child_node(root: Node, node: Node, part: str | int) -> Node | None:
     node = resolve_reference(root, node)
     if isinstance(part, int):
         return node.get("items")

@@ -65,7 +65,7 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
         raise ValueError("this run is finished: no answer can follow")
     counted = _count(rule, state, correct)
     if rule.is_bayesian:
-        return _place(rule, counted, correct)
+        return _apply_psi(rule, counted, correct)
     if counted.wrong_in_a_row >= _wrong_needed(rule, state):
         return _move(rule, counted, Heading.UP)
     if counted.right_in_a_row >= _right_needed(rule, state):
@@ -111,7 +111,7 @@ def _count(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Stairca
     )
 
 
-def _place(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
+def _apply_psi(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
     """The level that Psi chooses after this answer."""
     cap_db, answered = to_db(rule.cap_n), (*state.answered, (state.level_db, correct))
     probability = posterior(answered, cap_db)

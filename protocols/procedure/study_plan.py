@@ -74,7 +74,8 @@ class StudyPlan:
 
 
 def plan_study(protocol: StudyProtocol, participants: Sequence[Participant], next_number: int) -> StudyPlan:
-    """participants: of this protocol. Where no sample size is declared, the cells of the cycles begun are wanted."""
+    """The plan of a study: its cells with the participants that they have and need. participants: of this protocol.
+    Where no sample size is declared, the cells of the cycles begun are wanted."""
     planned = protocol.analysis.participants
     cycle = _cycle(protocol)
     sample = planned or -(-max(next_number, 1) // cycle) * cycle

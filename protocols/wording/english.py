@@ -10,7 +10,7 @@ from protocols.wording.english_screens import SCREENS
 ENGLISH: dict[str, str] = {**SCREENS, **FORMS, **FACTS, **HELP, **PROTOCOLS}
 
 LANGUAGES = {"en": "English", "de": "German", "es": "Spanish"}
-"""That come with hapteq, by their code."""
+"""Languages that come with hapteq, by their code (ISO 639-1)."""
 
 
 def placeholders(text: str) -> frozenset[str] | None:

@@ -115,4 +115,4 @@ PROTOCOLS: dict[str, str] = {
     "protocol_not_at_all": "not at all",
     "protocol_very": "very",
 }
-"""Where a protocol has one of these sentences, its language replaces it too."""
+"""Sentences of the shipped protocols by key: where a protocol has one of them, its language replaces it too."""

@@ -46,7 +46,7 @@ def in_language(values: Mapping[str, Any], table: Mapping[str, str], name: str) 
     resolved["title"] = translate(values.get("title"))
     for kind, key in (("consent", "statements"), ("consent", "exclusions"), ("setup", "grip")):
         if isinstance(values.get(kind), dict) and key in values[kind]:
-            resolved[kind] = {**resolved[kind], key: _each(values[kind][key], translate)}
+            resolved[kind] = {**resolved[kind], key: _translate_each(values[kind][key], translate)}
     for kind in ("before", "debrief"):
         if isinstance(values.get(kind), list):
             resolved[kind] = [_question(question, translate) for question in values[kind]]
@@ -57,14 +57,14 @@ def _question(question: Any, translate: Callable[[Any], Any]) -> Any:
     """What is logged of a choice does not change with the language."""
     if not isinstance(question, dict):
         return question
-    asked = {key: _each(value, translate) if key in ("question", "choices", "ends") else value
+    asked = {key: _translate_each(value, translate) if key in ("question", "choices", "ends") else value
              for key, value in question.items()}  # fmt: skip
     if question.get("choices") and not question.get("codes") and asked["choices"] != question["choices"]:
         asked["codes"] = question["choices"]
     return asked
 
 
-def _each(value: Any, translate: Callable[[Any], Any]) -> Any:
+def _translate_each(value: Any, translate: Callable[[Any], Any]) -> Any:
     return [translate(each) for each in value] if isinstance(value, list) else translate(value)
 
 

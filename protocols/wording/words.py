@@ -55,10 +55,10 @@ class Words:
         for key, pattern in PATTERNS.items():
             found = pattern.fullmatch(english)
             if found is not None:
-                return self.fill(key, {name: self._part(part) for name, part in found.groupdict().items()})
+                return self.fill(key, {name: self._fill_part(part) for name, part in found.groupdict().items()})
         return english
 
-    def _part(self, part: str) -> str:
+    def _fill_part(self, part: str) -> str:
         """What is filled into a fact: facts themselves, or a number."""
         return ", ".join(self.fact(each) for each in part.split(", ")) if self.fact(part) == part else self.fact(part)
 

@@ -31,7 +31,7 @@ from study.workflows.trial.requests_port import QueuedRequests
 
 
 @dataclass(frozen=True, slots=True)
-class Sitter:
+class SittingOptions:
     """Participant and options of a sitting."""
 
     observer: str | None
@@ -43,7 +43,7 @@ class Sitter:
 
 
 def begin(
-    sitter: Sitter,
+    sitter: SittingOptions,
     protocol_name: str,
     device: str,
     data: Path,
@@ -135,7 +135,7 @@ def code_of_simulated(observer: str) -> str:
     return "".join(c for c in observer if c.isascii() and c.isalnum())[:15] + "1"
 
 
-def _ask_subject(sitter: Sitter) -> str:
+def _ask_subject(sitter: SittingOptions) -> str:
     if sitter.observer is not None:
         return code_of_simulated(sitter.observer)
     if sys.stdin is None or not sys.stdin.isatty():

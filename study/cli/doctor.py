@@ -16,11 +16,13 @@ from study.cli.study import DataOption, DeviceOption, HandsOffOption
 
 if TYPE_CHECKING:
     from study.session.views.views import DeviceFinding
-    from study.workflows.checks.daily_check import Moving
+    from study.workflows.checks.daily_check import MotionCallbacks
     from study.workflows.checks.examine_setup import Examination
 
 NAME_WIDTH = 17
+"""Columns of a finding's name."""
 CALIBRATION_S = 60.0
+"""Longest wait for a calibration by hand (s)."""
 
 
 TimingOption = Annotated[
@@ -83,7 +85,7 @@ def doctor(
     if as_json:
         typer.echo(json.dumps(_document(examination), indent=2))
     else:
-        _say(examination)
+        _print_findings(examination)
     if accept is not None:
         _accept(device, examination, accept, hands_off)
     if examination.exit_code:
@@ -133,14 +135,14 @@ def _check_today(device: str, examination: "Examination", as_json: bool, hands_o
 
 
 @contextmanager
-def _moving(hands_off: bool) -> "Iterator[Moving]":
+def _moving(hands_off: bool) -> "Iterator[MotionCallbacks]":
     from functools import partial
 
     from study.cli.progress import late_bar
-    from study.workflows.checks.daily_check import Moving, seconds_of_play
+    from study.workflows.checks.daily_check import MotionCallbacks, seconds_of_play
 
     with late_bar("The device moves (s)", total=round(seconds_of_play())) as show:
-        yield Moving(partial(announce, hands_off=hands_off), show)
+        yield MotionCallbacks(partial(announce, hands_off=hands_off), show)
 
 
 def _calibrate(device: str) -> None:
@@ -169,7 +171,7 @@ def _calibrate_sensor(port: str, baud: int, keep: bool) -> None:
     typer.echo(table)
 
 
-def _say(examination: "Examination") -> None:
+def _print_findings(examination: "Examination") -> None:
     timing = examination.timing
     parts = {
         "Installation": examination.installation,

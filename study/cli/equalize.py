@@ -58,7 +58,7 @@ def equalize(
     *models, trajectory = files
     plan = EqualizePlan(tuple(models), trajectory, out, at, weight, cap, constrain, physics)
     found, lines = (
-        _once(plan)
+        _equalize_once(plan)
         if repeat is None or device is None
         else _play_repeatedly(plan, RepeatOrder(repeat, device, earlier, seed), hands_off)
     )
@@ -82,7 +82,7 @@ def _check_arguments(files: list[Path], repeat: int | None, device: str | None, 
         )
 
 
-def _once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ...]]":
+def _equalize_once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ...]]":
     from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
     from study.workflows.equalizer.equalized_summary import summary, summary_lines
 

@@ -90,6 +90,7 @@ def _tables(found: "Overview") -> Iterable[str]:
 
 
 MOST_SEGMENTS = 20
+"""Segments printed in the terminal; the page lists all."""
 
 
 def say(lines: Iterable[str]) -> None:

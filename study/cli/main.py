@@ -89,7 +89,7 @@ def _settle_in() -> None:
             output.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
-            signal.signal(getattr(signal, name), _leave)
+            signal.signal(getattr(signal, name), _exit_on_signal)
     for library in ("OPENBLAS", "OMP", "MKL"):
         # Matrices here are small: threads would cost more in waiting than they save. Read when numpy is loaded.
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
@@ -124,6 +124,6 @@ def _system_error(problem: OSError) -> StudyError:
     )
 
 
-def _leave(number: int, frame: FrameType | None) -> None:
+def _exit_on_signal(number: int, frame: FrameType | None) -> None:
     """SIGTERM or a closed terminal: leave like Ctrl-C, with the device released and the log closed."""
     raise KeyboardInterrupt

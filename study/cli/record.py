@@ -75,7 +75,8 @@ def announce(notice: str, hands_off: bool, held: bool = False) -> None:
 
 
 def require_confirmation(hands_off: bool, held: bool = False) -> None:
-    """Raises WrongUseError where no person can confirm what a real device will do. Arguments as of `announce`."""
+    """Require that a person can confirm what a real device will do. Raises WrongUseError where no person can confirm
+    what a real device will do. Arguments as of `announce`."""
     from study.cli.screen import has_keys
 
     if has_keys() or (hands_off and not held):

@@ -46,12 +46,12 @@ def open_screen(start: "AppStart", as_json: bool) -> None:
         app.run()
     finally:
         app.close_engine()
-    _say(app.outcome, as_json)
+    _print_outcome(app.outcome, as_json)
     if app.return_code:
         raise typer.Exit(app.return_code)
 
 
-def _say(outcome: "Finished | Failed | None", as_json: bool) -> None:
+def _print_outcome(outcome: "Finished | Failed | None", as_json: bool) -> None:
     from study.tui.engine.from_engine import Failed
 
     if outcome is None:

@@ -11,7 +11,7 @@ from study.errors import StudyError, WrongUseError
 from study.tui.keys.answer_keys import parse_keys
 
 CONTEXT_SETTINGS = {"allow_extra_args": True, "ignore_unknown_options": True}
-"""What serve does not know are options of `hapteq study`."""
+"""Options that `serve` does not know are passed on to `hapteq study`."""
 
 EVERYWHERE = ("0.0.0.0", "::", "")
 """Addresses to listen on that no browser can open."""

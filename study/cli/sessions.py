@@ -38,7 +38,7 @@ def sessions(
 def _table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -> Iterator[str]:
     from study.local_clock import machine_zone
     from study.session.views.local_time import local_column
-    from study.tui.standing_words import standing_words
+    from study.tui.session_status import status_text
     from study.tui.text_rows import lines_of_rows
 
     offset, begun = local_column([line.begun_utc for line in lines], machine_zone)
@@ -46,7 +46,7 @@ def _table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -
     rows = [
         (
             line.name,
-            standing_words(line.standing),
+            status_text(line.standing),
             when,
             f"{line.runs_done}/{line.runs}" if line.runs else "",
             str(line.answers) if line.runs else "",

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from study.session.views.archive_views import DiagnosisView, SessionView, Staircase
 
 PLOT_COLUMNS, PLOT_ROWS = 78, 12
+"""Size of a staircase's picture, in characters."""
 
 
 def show(
@@ -45,14 +46,14 @@ def show(
         from study.workflows.views.view_diagnosis import diagnosis_view
 
         diagnosis = diagnosis_view(document)
-        _say([json.dumps(asdict(diagnosis), indent=2)] if as_json else _diagnosis_lines(diagnosis))
+        _print_lines([json.dumps(asdict(diagnosis), indent=2)] if as_json else _diagnosis_lines(diagnosis))
         return
     from study.local_clock import machine_zone
     from study.session.views.local_time import in_utc
     from study.workflows.views.view_session import session_view
 
     session = session_view(_folder(what, data), in_utc if as_json else machine_zone)
-    _say([json.dumps(asdict(session), indent=2)] if as_json else _session_lines(session, log))
+    _print_lines([json.dumps(asdict(session), indent=2)] if as_json else _session_lines(session, log))
 
 
 def _show_recording(path: Path, as_json: bool) -> None:
@@ -61,7 +62,7 @@ def _show_recording(path: Path, as_json: bool) -> None:
 
     found = look_at([path])
     if as_json:
-        _say([json.dumps(look_document(found)[0], indent=2)])
+        _print_lines([json.dumps(look_document(found)[0], indent=2)])
         return
     say([*recording_facts(found[0]), *recording_lines(found[0]), "", f"Its checks: hapteq look {path}"])
 
@@ -77,7 +78,7 @@ def _folder(what: str, data: Path) -> Path:
 
 def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
     from study.tui.drawing.staircase_drawing import LEGEND
-    from study.tui.standing_words import describe
+    from study.tui.session_status import describe
     from study.tui.text_rows import align_rows
 
     yield describe(view.line)
@@ -130,6 +131,6 @@ def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
         yield f"\nReport: {view.report}"
 
 
-def _say(lines: Iterable[str]) -> None:
+def _print_lines(lines: Iterable[str]) -> None:
     for line in lines:
         typer.echo(line)

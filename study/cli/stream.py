@@ -21,7 +21,7 @@ def stream(
     from study.store.sessions.archive import find_session
     from study.store.sessions.request_inbox import RequestInbox
     from study.workflows.views.lsl_outlets import MarkerOutlet
-    from study.workflows.views.stream_session import Beside, stream_session
+    from study.workflows.views.stream_session import SideTasks, stream_session
     from study.workflows.views.stream_signals import SignalStreams
 
     folder = find_session(session, data)
@@ -34,5 +34,5 @@ def stream(
             inbox.send(NoteAsked("program", text))
 
     typer.echo(f"Streaming {folder.name}; Ctrl-C ends it, and not the session.", err=True)
-    sent = stream_session(folder.log, outlet, on_marker=typer.echo, beside=Beside(note, signals.push))
+    sent = stream_session(folder.log, outlet, on_marker=typer.echo, beside=SideTasks(note, signals.push))
     typer.echo(f"{sent} markers and {signals.sent} ticks; the session is finished.", err=True)

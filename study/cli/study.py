@@ -77,12 +77,12 @@ def study(
         first = None if order is None else Begin(order)
         open_screen(AppStart(str(data), device, answer_keys, first, protocol, seed, equalizer), as_json)
         return
-    from study.cli.conduct import Sitter, begin
+    from study.cli.conduct import SittingOptions, begin
 
     if observer is None and not plain and not has_keys():
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
-    sitter = Sitter(observer=observer, subject=subject, keys=answer_keys, hands_off=hands_off)
+    sitter = SittingOptions(observer=observer, subject=subject, keys=answer_keys, hands_off=hands_off)
     begin(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json, model=model)
 
 

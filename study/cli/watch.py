@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 LOG_NAME = "events.jsonl"
 """As `study.store.sessions.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
 PLAIN_EVERY_S = 0.2
+"""Interval between two views in plain lines (s)."""
 
 
 def watch(
@@ -35,9 +36,9 @@ def watch(
     """Follow a running session from a second terminal, without changing it; stop it, pause it, note something."""
     folder = _folder(session or _last_changed(data), data)
     if stop or pause or note or adverse:
-        _ask(folder, stop, pause, ((note, False), (adverse, True)))
+        _send_requests(folder, stop, pause, ((note, False), (adverse, True)))
     elif once or as_json:
-        _once(folder, as_json)
+        _print_once(folder, as_json)
     elif plain or not (sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()):
         _plain(folder)
     else:
@@ -77,7 +78,7 @@ def _screen(folder: Path) -> None:
         feed.close()
 
 
-def _once(folder: Path, as_json: bool) -> None:
+def _print_once(folder: Path, as_json: bool) -> None:
     from dataclasses import asdict
 
     from study.devices.clock import RealClock
@@ -114,7 +115,7 @@ def _plain(folder: Path) -> None:
         clock.sleep(PLAIN_EVERY_S)
 
 
-def _ask(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], ...]) -> None:
+def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], ...]) -> None:
     from study.cli.note import write_note
     from study.session.watching.requests import PauseAsked, StopAsked
     from study.store.sessions.archive import SessionFolder

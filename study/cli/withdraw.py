@@ -18,7 +18,7 @@ def withdraw(
     Interrupted, the same command goes on. Links are not followed; what is not proved to be the participant's is listed.
     """
     from study.devices.clock import RealClock
-    from study.workflows.session.withdraw_participant import plan_withdrawal, session_to_withdraw, still_elsewhere
+    from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, session_to_withdraw
     from study.workflows.session.withdraw_participant import withdraw as erase
 
     folder = session_to_withdraw(session, data)
@@ -32,7 +32,7 @@ def withdraw(
     if not yes and not typer.confirm("Erase them?", err=True):
         typer.echo("Nothing was erased.", err=True)
         return
-    elsewhere = still_elsewhere(place, plan)
+    elsewhere = copies_elsewhere(place, plan)
     erase(place, plan, RealClock().utc())
     typer.echo(f"Erased: {', '.join(plan.sessions)}")
     if made:

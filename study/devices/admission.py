@@ -35,9 +35,10 @@ HIGHEST_PLAUSIBLE = {
     "stale_s": 5.0,
     "still_s": 60.0,
 }
-"""As in `protocols.definition.plausibility`; repeated here for settings that come from no protocol."""
+"""Bounds as in `protocols.definition.plausibility`, repeated for settings that come from no protocol."""
 
 RATES_HZ = (100.0, 10_000.0)
+"""Accepted rates of a device's loop (Hz)."""
 
 HEAVIEST_KG = 10.0
 """The spring's stiffness rests on the mass that the device says: no handle on a desk weighs so much."""
@@ -49,23 +50,25 @@ FADE_SHAPES = ("raised_cosine", "linear")
 
 
 def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:
-    """Raises `DeviceError` for limits that are no limits, or weaker than may be, and for a device of no known kind."""
+    """Check limits and device before opening. Raises `DeviceError` for limits that are no limits, or weaker than may
+    be, and for a device of no known kind."""
     _check_info(info)
     limits = settings.limits
     times = {name: getattr(limits, name) for name in HIGHEST if name != "keep_s"} | {"keep_s": settings.keep_s}
     for name, value in times.items():
-        _within(name, value, HIGHEST[name])
+        _check_within(name, value, HIGHEST[name])
     _check_caps(settings, info)
     for name, highest in HIGHEST_PLAUSIBLE.items():
-        _within(f"plausibility.{name}", getattr(limits.plausibility, name), highest, zero=name == "friction_n")
-    _within("spring_frequency_hz", settings.spring_frequency_hz, 10.0, zero=True)
-    _within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, zero=True)
+        _check_within(f"plausibility.{name}", getattr(limits.plausibility, name), highest, zero=name == "friction_n")
+    _check_within("spring_frequency_hz", settings.spring_frequency_hz, 10.0, zero=True)
+    _check_within("spring_damping_n_s_per_m", settings.spring_damping_n_s_per_m, 20.0, zero=True)
     if not all(math.isfinite(component) for component in settings.place_m):
         raise _settings_error(f"place_m is {settings.place_m}; it must be three numbers, in metres.")
 
 
 def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: DeviceSettings) -> None:
-    """Raises `DeviceError` for a real device in a hand that would hold its force when this program is gone."""
+    """Check that the hardware releases its force by itself. Raises `DeviceError` for a real device in a hand that would
+    hold its force when this program is gone."""
     if info.simulated or not settings.hand_on_handle or 0 < drops_force_after_s <= LONGEST_DROP_S:
         return
     raise DeviceError(
@@ -77,7 +80,7 @@ def check_hardware(drops_force_after_s: float, info: DeviceInfo, settings: Devic
 
 
 def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> None:
-    """Raises `DeviceError` for a loop that cannot be held within the limits."""
+    """Check that a stimulus can be held. Raises `DeviceError` for a loop that cannot be held within the limits."""
     if stimulus.fade_shape not in FADE_SHAPES:
         raise _refusal(f"its fade shape is {stimulus.fade_shape!r}; known are {' and '.join(FADE_SHAPES)}")
     for name, seconds in (("fade_in_s", stimulus.fade_in_s), ("fade_out_s", stimulus.fade_out_s)):
@@ -92,7 +95,8 @@ def check_stimulus(stimulus: HeldStimulus, limits: Limits, rate_hz: float) -> No
 
 
 def check_commands(commands: Signal, limits: Limits, rate_hz: float) -> None:
-    """Raises `DeviceError` for commands that cannot be played within the limits, from zero force on."""
+    """Check that commands can be played once. Raises `DeviceError` for commands that cannot be played within the
+    limits, from zero force on."""
     _check_forces(commands, limits, rate_hz)
     _check_steps(np.diff(commands.samples, axis=0, prepend=0.0), limits, rate_hz)
 
@@ -138,12 +142,12 @@ def _check_caps(settings: DeviceSettings, info: DeviceInfo) -> None:
         raise _settings_error("beyond_hand_ceiling is set while a hand is on the handle.")
     ceiling_n = info.max_force_n if beyond else min(info.max_force_n, HAND_TOTAL_CAP_N)
     stimulus_ceiling_n = ceiling_n if beyond else min(ceiling_n, HAND_STIMULUS_CAP_N)
-    _within("total_cap_n", limits.total_cap_n, ceiling_n)
-    _within("feedback_cap_n", limits.feedback_cap_n, ceiling_n if beyond else HAND_TOTAL_CAP_N)
-    _within("stimulus_cap_n", limits.stimulus_cap_n, min(stimulus_ceiling_n, limits.total_cap_n))
+    _check_within("total_cap_n", limits.total_cap_n, ceiling_n)
+    _check_within("feedback_cap_n", limits.feedback_cap_n, ceiling_n if beyond else HAND_TOTAL_CAP_N)
+    _check_within("stimulus_cap_n", limits.stimulus_cap_n, min(stimulus_ceiling_n, limits.total_cap_n))
 
 
-def _within(name: str, value: float, highest: float, *, zero: bool = False) -> None:
+def _check_within(name: str, value: float, highest: float, *, zero: bool = False) -> None:
     if not (0 < value <= highest or (zero and value == 0)):
         allowed = "at least 0" if zero else "above 0"
         raise _settings_error(f"{name} is {value:g}; it must be {allowed} and at most {highest:g}.")

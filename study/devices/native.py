@@ -78,6 +78,8 @@ def word(context: Any, address: Any, place: Any) -> Any:
 
 @_intrinsic
 def set_word(context: Any, address: Any, place: Any, value: Any) -> Any:
+    """Write a 64-bit word at `address`, `place` words on."""
+
     def code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
         start = builder.inttoptr(values[0], ir.IntType(64).as_pointer())
         builder.store(values[2], builder.gep(start, [values[1]]))
@@ -120,6 +122,7 @@ def acquire(system: Addresses, patience_s: float) -> bool:
 
 @part
 def release(system: Addresses) -> None:
+    """Release the lock of this system."""
     call_int(system[RELEASE], (system[LOCK],))
 
 
@@ -150,7 +153,7 @@ class SharedLock:
 
 
 _monotonic = ctypes.CFUNCTYPE(ctypes.c_double)(time.monotonic)
-"""For systems whose own clock is not read here: it takes the interpreter lock."""
+"""Clock for systems whose own is not read here: it takes the interpreter lock."""
 
 
 def address_of(function: Any) -> int:

@@ -81,37 +81,37 @@ class OnsetLine:
         self._line = line
         self._asked: SimpleQueue[SimpleQueue[Pulse] | None] = SimpleQueue()
         self._busy = threading.Lock()
-        self._thread = threading.Thread(target=self._work, name="onset line", daemon=True)
+        self._thread = threading.Thread(target=self._run_thread, name="onset line", daemon=True)
         self._thread.start()
 
     def pulse(self) -> Pulse:
         """Waits until it has gone out, at most `PATIENCE_S`."""
         if self._busy.locked():
-            return self._lost("the pulse before it still hangs")
+            return self._lost_pulse("the pulse before it still hangs")
         answer: SimpleQueue[Pulse] = SimpleQueue()
         self._asked.put(answer)
         try:
             return answer.get(timeout=PATIENCE_S)
         except Empty:
-            return self._lost(f"the line took none within {1000 * PATIENCE_S:g} ms")
+            return self._lost_pulse(f"the line took none within {1000 * PATIENCE_S:g} ms")
 
     def close(self) -> None:
         """Lowers the line. Never raises."""
         self._asked.put(None)
         self._thread.join(1.0)
 
-    def _work(self) -> None:
+    def _run_thread(self) -> None:
         while (answer := self._asked.get()) is not None:
             with self._busy:
-                self._give(answer)
+                self._hand_over(answer)
         self._hang_up()
 
-    def _give(self, answer: SimpleQueue[Pulse]) -> None:
+    def _hand_over(self, answer: SimpleQueue[Pulse]) -> None:
         try:
             self._line = self._line or self._open_line(self._settings)
             self._line.raise_level()
         except Exception as problem:  # noqa: BLE001 - a trial goes on without its pulse for any error of a driver
-            answer.put(self._lost(str(problem) or type(problem).__name__))
+            answer.put(self._lost_pulse(str(problem) or type(problem).__name__))
             self._hang_up()
             return
         answer.put(Pulse(self._settings.words, time.monotonic()))
@@ -126,7 +126,7 @@ class OnsetLine:
                 with contextlib.suppress(Exception):
                     last()
 
-    def _lost(self, trouble: str) -> Pulse:
+    def _lost_pulse(self, trouble: str) -> Pulse:
         return Pulse(self._settings.words, None, trouble)
 
 
@@ -145,7 +145,7 @@ def open_onset_line(settings: PulseSettings) -> OnsetLine:
 
 
 def open_port(settings: PulseSettings) -> Line:
-    """Raises OSError, ValueError, and `DeviceError` where pyserial is missing."""
+    """Open a serial line for onset pulses. Raises OSError, ValueError, and `DeviceError` where pyserial is missing."""
     if settings.kind == "parallel":
         return _Parallel(settings)
     try:
@@ -169,15 +169,15 @@ class _SerialByte:
         self._line, self._code = line, code
 
     def raise_level(self) -> None:
-        self._send(self._code)
+        self._send_code(self._code)
 
     def lower_level(self) -> None:
-        self._send(0)
+        self._send_code(0)
 
     def close(self) -> None:
         self._line.close()
 
-    def _send(self, code: int) -> None:
+    def _send_code(self, code: int) -> None:
         self._line.write(bytes([code]))
 
 

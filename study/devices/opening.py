@@ -72,7 +72,8 @@ class LinkageSource(Protocol):
         ...
 
     def check_frame(self) -> None:
-        """Raises `DeviceError` where the positions above are not in the axes of the device's readings."""
+        """Check the axes of the positions that a linkage's calibration uses. Raises `DeviceError` where the positions
+        above are not in the axes of the device's readings."""
         ...
 
 
@@ -171,7 +172,7 @@ def masking_sound(samples: "Samples", rate_hz: int) -> "MaskingSound":
     return MaskingSound(samples, rate_hz, open_stream)
 
 
-def before_others() -> AbstractContextManager[object]:
+def raise_thread_priority() -> AbstractContextManager[object]:
     """The calling thread, until it ends, as a real device's loop: before all other programs where that is allowed."""
     from study.devices.drive.real_time_class import real_time_class
 
@@ -243,9 +244,9 @@ def accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
     return check_accepted(info, today)
 
 
-def proof_force_n() -> float:
+def limit_test_force_n() -> float:
     """Force with which `accept_device` pushes the handle."""
-    from study.devices.force_dimension.force_proof import FORCE_N
+    from study.devices.force_dimension.force_limit_check import FORCE_N
 
     return FORCE_N
 
@@ -258,12 +259,12 @@ def accept_device(
     Raises `DeviceError`. The caller has checked everything else before. baseline: name and SHA-256 of the recording
     that the daily check is to compare with."""
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
-    from study.devices.force_dimension.force_proof import (
-        ASKED_SHARE,
+    from study.devices.force_dimension.force_limit_check import (
+        COMMANDED_TO_CAP,
         FORCE_N,
-        check_provable,
-        prove_cap_holds,
-        prove_force_goes,
+        check_cap_holds,
+        check_force_vanishes,
+        require_testable,
     )
     from study.devices.rigs_by_name import RIGS_BY_NAME
     from study.devices.safe import SafeDevice
@@ -272,17 +273,17 @@ def accept_device(
     settings = replace(settings, hand_on_handle=False, limits=limits)
     rig: Any = RIGS_BY_NAME[name](settings, 0)
     try:
-        check_provable(rig)
+        require_testable(rig)
         device = SafeDevice(rig, settings, clock)
         with contextlib.closing(device):
-            most_given_n = prove_cap_holds(device, rig)
-            gone_after_s = prove_force_goes(device, rig)
+            most_given_n = check_cap_holds(device, rig)
+            gone_after_s = check_force_vanishes(device, rig)
     finally:
         rig.close()
     today, info = clock.utc()[:10], device.info
-    tried = FORCE_N, gone_after_s, ASKED_SHARE * FORCE_N, most_given_n
+    tried = FORCE_N, gone_after_s, COMMANDED_TO_CAP * FORCE_N, most_given_n
     path = write_acceptance(Acceptance(info.name, info.details, operator, today, *tried, *baseline))
     return (
-        f"{info.name}: of {ASKED_SHARE * FORCE_N:g} N that were asked for with a cap of {FORCE_N:g} N it gave "
+        f"{info.name}: of {COMMANDED_TO_CAP * FORCE_N:g} N that were asked for with a cap of {FORCE_N:g} N it gave "
         f"{most_given_n:.2g} N; a force of {FORCE_N:g} N was gone {1000 * gone_after_s:.0f} ms after the loop; {path}"
     )

@@ -26,6 +26,7 @@ TRUE_ACCELERATION = slice(6, 9)
 SENSOR_CLIPPED = 9
 """1 if a channel of the accelerometer was at its limit, else 0."""
 READING_SIZE = 10
+"""Numbers in a reading."""
 
 
 class Rig(Protocol):
@@ -66,7 +67,7 @@ class Rig(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Halves:
+class CompiledIo:
     """The same driver compiled: a `Rig` that has an attribute `halves` is driven without the interpreter.
 
     Both do exactly what the rig's own `sense` and `write` do, errors too; the rig's `buttons` is then asked from any
@@ -87,7 +88,7 @@ class Halves:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sensed:
+class SensedAcceleration:
     """What an accelerometer measured that is read apart from the ticks."""
 
     acceleration_mps2: FloatArray
@@ -96,11 +97,11 @@ class Sensed:
 
 
 @runtime_checkable
-class SensesApart(Protocol):
+class OwnClockSensor(Protocol):
     """A rig whose accelerometer has a clock of its own. Its newest value stands in each reading; what belongs to a
     tick is known only later."""
 
-    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
         """tick_s (k,): when the ticks were due, 1 / rate_hz apart, by the clock of the loop; since_s: from when on is
         counted. None without such a sensor. In any thread, while nothing moves; may take 0.1 s."""
         ...

@@ -18,7 +18,7 @@ from study.store.formats.calibration_file import read_calibration
 
 
 def simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
-    """Raises `DeviceError` for a place where there is no workspace."""
+    """The simulated omega.3. Raises `DeviceError` for a place where there is no workspace."""
     return _build_simulated(settings, seed, friction=True)
 
 

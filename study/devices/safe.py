@@ -15,14 +15,14 @@ from equalizer.signals.signal import Signal
 from study.devices.admission import check_commands, check_hardware, check_settings, check_stimulus
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, Played
-from study.devices.drive.played import record_commands, record_held_stimulus
+from study.devices.drive.last_reading import look_of
 from study.devices.drive.realtime_drive import RealtimeDrive
+from study.devices.drive.recorded_run import record_commands, record_held_stimulus
 from study.devices.drive.runner import CompiledRunner, Runner
-from study.devices.drive.seen import look_of
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import VirtualDrive
 from study.devices.governor.governor import SETTLE_S, Governor
-from study.devices.rig import CompiledRig, Rig, SensesApart, no_hand
+from study.devices.rig import CompiledRig, OwnClockSensor, Rig, no_hand
 from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -31,6 +31,7 @@ BLOCK_S = 0.05
 """The longest stretch in real time during which Python is not asked."""
 
 VIRTUAL_BLOCK_S = 5.0
+"""Largest block of ticks that virtual time runs at once (s)."""
 
 NOT_CLOSED = (
     "the device did not answer when it was closed: it got zero force, and its brakes may be off; what was measured is "
@@ -53,7 +54,7 @@ class SafeDevice:
             check_hardware(rig.drops_force_after_s, rig.info, settings)
         self._info = rig.info
         self._simulated_hand = rig.simulate_hand if isinstance(rig, CompiledRig) else no_hand
-        self._apart = rig if isinstance(rig, SensesApart) else None
+        self._apart = rig if isinstance(rig, OwnClockSensor) else None
         self._limits = settings.limits
         self._hand_on_handle = settings.hand_on_handle
         self._clock = clock
@@ -101,9 +102,9 @@ class SafeDevice:
         return Fault.STOPPED if self._governor.stop_asked and fault is not Fault.FORCE_LEFT else fault
 
     def health(self) -> Health:
-        return self._told(replace(self._governor.health(), fault=self.fault()))
+        return self._with_missed_ticks(replace(self._governor.health(), fault=self.fault()))
 
-    def _told(self, health: Health) -> Health:
+    def _with_missed_ticks(self, health: Health) -> Health:
         failure = self._runner.failure
         if failure is None:
             return health
@@ -117,7 +118,7 @@ class SafeDevice:
         self._wait_until_still(stimulus.fade_out_s)
         self._held = None
         played = record_held_stimulus(self._governor, self._info, self._apart)
-        return replace(played, health=self._told(played.health))
+        return replace(played, health=self._with_missed_ticks(played.health))
 
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> Played:
         self._must_be_idle()

@@ -133,7 +133,7 @@ class TelemetryReader:
         first = max(self._next, count - size)
         wanted = np.arange(first, count)
         rows = self._rows[1 + wanted % size]  # a copy
-        good = _whole(rows) & (rows[:, cells.RING_INDEX] == wanted)
+        good = _is_consistent(rows) & (rows[:, cells.RING_INDEX] == wanted)
         # What was not seen whole was overwritten meanwhile, and is lost, or is too new, and waits for the next call.
         too_new = wanted[~good & (wanted > int(self._rows[0, cells.RING_COUNT]) - size)]
         if len(too_new):
@@ -144,7 +144,7 @@ class TelemetryReader:
         return _telemetry(rows[kept])
 
 
-def _whole(rows: FloatArray) -> np.ndarray:
+def _is_consistent(rows: FloatArray) -> np.ndarray:
     bits = rows.view(np.int64)
     checked = bits[:, : cells.RING_CHECK]
     checks = np.sum((checked ^ (checked >> cells.RING_FOLD)) * cells.RING_FACTORS, axis=1)

@@ -25,6 +25,7 @@ from study.importing.part_signals import Key, PartSignals, part_signals
 from study.importing.time_base import NUMBERED_HZ, time_base, without_doubled_rows
 
 _NAMED = 3
+"""Parts that a message names."""
 
 
 class ImportNotes:
@@ -52,7 +53,7 @@ def _abbreviate_list(parts: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Built:
+class BuiltRecording:
     """A recording built from imported files, in memory."""
 
     recording: Recording
@@ -68,7 +69,7 @@ class _Part:
 
 def build_recording(
     wanted: ImportMap, files: Sequence[Path], on_progress: Callable[[float], None] = lambda share: None
-) -> Built:
+) -> BuiltRecording:
     """Read, align, resample and convert. on_progress: share done, 0 to 1. Raises CannotReadError,
     ImportRefusedError."""
     what = files[0].name if len(files) == 1 else f"{files[0].name} with {len(files) - 1} more"
@@ -81,14 +82,14 @@ def build_recording(
         budget = Budget()
         for number, part in enumerate(planned):
             counter = _Counter(number * steps / len(planned), steps, on_progress)
-            parts.append(_part(wanted, part, import_notes, counter, budget))
+            parts.append(_build_part(wanted, part, import_notes, counter, budget))
         recording, repeats = find_segments(_concatenate(wanted, parts, units))
     except ImportProblemError as error:
         raise ImportRefusedError(what, str(error)) from error
     if problems := recording_problems(recording):
         raise ImportRefusedError(what, "; ".join(problems))
     notes = import_notes.sentences([part.label for part in planned])
-    return Built(recording, (*notes, *_unit_remark(wanted), *filter(None, (_odd_rate(recording), repeats))))
+    return BuiltRecording(recording, (*notes, *_unit_remark(wanted), *filter(None, (_odd_rate(recording), repeats))))
 
 
 class _Counter:
@@ -102,7 +103,9 @@ class _Counter:
         self.on_progress(min(1.0, self.done / self.steps))
 
 
-def _part(wanted: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _Counter, budget: Budget) -> _Part:
+def _build_part(
+    wanted: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _Counter, budget: Budget
+) -> _Part:
     read: dict[Path, Arrays] = {}
     loggers = []
     notes: list[str] = []

@@ -41,16 +41,16 @@ def read_without_map(path: Path) -> Arrays:
     """Read the arrays of a file that no map describes. Raises CannotReadError, and ImportRefusedError for an invalid
     field in a column whose name states a role, a quantity or a time, or where every column has one."""
     arrays = read_arrays(path, CsvMap())
-    faulty = [name for name, array in arrays.by_name.items() if _fault(array)]
+    faulty = [name for name, array in arrays.by_name.items() if _find_fault(array)]
     columns = [name_signal(header) for header in arrays.by_name] if faulty else []
     for column, role in zip(columns, propose_roles(columns), strict=True):
         used = role or column.quantity or _is_time(column) or len(faulty) == len(columns)
         if used and column.header in faulty:
-            raise ImportRefusedError(path.name, _fault(arrays.by_name[column.header]), MEND)
+            raise ImportRefusedError(path.name, _find_fault(arrays.by_name[column.header]), MEND)
     return arrays
 
 
-def _fault(array: Array) -> str:
+def _find_fault(array: Array) -> str:
     reason = left_out(array)
     return reason if isinstance(reason, FaultyColumn) else ""
 
@@ -90,7 +90,7 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
     others = [
         name
         for name, array in arrays.by_name.items()
-        if not array.ndim and name != rate and not _fault(array)  # it has a remark of its own
+        if not array.ndim and name != rate and not _find_fault(array)  # it has a remark of its own
     ]
     left_out += [f"Left out: '{name}' is no column." for name in others]
     peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_bracketed(channel.value))]

@@ -20,13 +20,14 @@ from study.importing.map_format.map_files import part_files
 from study.importing.map_format.map_toml import KIND, is_map, parse_map
 from study.importing.map_skeleton import map_skeleton
 from study.store.disk.hdf5_file import format_of, is_hdf5
-from study.store.disk.toml_text import read_toml_text
+from study.store.disk.text_file import read_toml_text
 from study.store.formats.recording_layout import FORMAT
 
 NO_DATA = (".toml", ".md")
 """File types beside data that are not data."""
 _NUMBER = re.compile(r"\d+")
 _SHOWN = 4
+"""Files that a message names."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,14 +55,14 @@ def is_growing_time(name: str, array: Array) -> bool:
 
 def name_words(name: str) -> set[str]:
     """Words of a name without its unit, in small letters."""
-    return set(_words(unit_in(name)[0]))
+    return set(_split_words(unit_in(name)[0]))
 
 
-def _words(plain: str) -> list[str]:
+def _split_words(plain: str) -> list[str]:
     return "".join(letter if letter.isalnum() else " " for letter in plain.lower()).split()
 
 
-def _last(name: str) -> str:
+def _last_part(name: str) -> str:
     """Last part of a name of several levels (`data.fs`, `1-of-2/fs`), without its unit."""
     return re.split(r"[./](?=\w)(?!k?Hz\b)", unit_in(name)[0])[-1]
 
@@ -71,7 +71,7 @@ def rates_in(arrays: Arrays) -> Mapping[str, str]:
     """Single numbers named as a sample rate, or as the step between samples, by the expression that gives the rate;
     rates first."""
     single = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
-    rates = {name: name for name in single if _RATE.fullmatch(" ".join(_words(_last(name))))}
+    rates = {name: name for name in single if _RATE.fullmatch(" ".join(_split_words(_last_part(name))))}
     steps = {f"1 / {quote(name)}": name for name in single if name_words(name) & _STEP_WORDS}
     return {**rates, **steps}
 

@@ -5,7 +5,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from study.participants.observer import Felt
+from study.participants.observer import PerceivedStimulus
 
 _MEDIAN_RESPONSE_S = math.sqrt(1.2 * 2.5)
 _SPREAD_OF_LOG = math.log(2.5 / 1.2) / (2 * 1.96)
@@ -16,7 +16,7 @@ _OBSERVERS = 0x0B5E
 correlated with the directions."""
 
 
-def uniform(felt: Felt, seed: int, count: int) -> tuple[float, ...]:
+def uniform(felt: PerceivedStimulus, seed: int, count: int) -> tuple[float, ...]:
     """`count` independent draws, uniform in (0, 1), for this presentation."""
     key = (_OBSERVERS, felt.run, felt.trial, felt.attempt)
     words = np.random.SeedSequence(entropy=seed, spawn_key=key).generate_state(count, np.uint64)

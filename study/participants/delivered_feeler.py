@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from protocols.trial import Phase
 from study.participants.direction_feeler import DirectionFeeler
-from study.participants.observer import Felt, Reply
+from study.participants.observer import PerceivedStimulus, Reply
 from study.participants.psychometric_curve import threshold_at
 
 MPS2_PER_N = ((5.0, 1.5), (15.0, 2.7), (25.0, 2.85), (35.0, 3.1), (45.0, 3.6))
@@ -36,15 +36,15 @@ class DeliveredFeeler:
     adaptation_trials: float = 20.0
     """Time constant of adaptation, in trials of a run."""
 
-    def reply(self, felt: Felt, seed: int) -> Reply:
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """The answer to one presentation."""
         return self.feeler.reply(replace(felt, level_n=self.felt_n(felt)), seed)
 
-    def share_right(self, felt: Felt) -> float:
+    def share_right(self, felt: PerceivedStimulus) -> float:
         """Probability of the right answer."""
         return self.feeler.share_right(replace(felt, level_n=self.felt_n(felt)))
 
-    def felt_n(self, felt: Felt) -> float:
+    def felt_n(self, felt: PerceivedStimulus) -> float:
         """The commanded force that would be told as well, delivered without a flaw and before any adaptation."""
         delivered = felt.delivered
         if felt.phase is Phase.DETECTION or delivered is None:

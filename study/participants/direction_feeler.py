@@ -17,7 +17,7 @@ from statistics import NormalDist
 from protocols.trial import Phase
 from study.participants.chance import response_time_s, uniform
 from study.participants.detection import DETECTION_SLOPE, TYPICAL_DETECTION_N
-from study.participants.observer import Felt, Reply
+from study.participants.observer import PerceivedStimulus, Reply
 from study.participants.psychometric_curve import WeibullCurve, threshold_at
 
 _NORMAL = NormalDist()
@@ -45,28 +45,28 @@ class DirectionFeeler:
     detection_n: tuple[tuple[float, float], ...] = TYPICAL_DETECTION_N
     """(frequency in Hz, level in N at which the vibration's interval is found 79.37 % of the time)."""
 
-    def reply(self, felt: Felt, seed: int) -> Reply:
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """The answer to one presentation."""
         luck, delay = uniform(felt, seed, 2)
         answer = 1 if luck < self.share_of_1(felt) else 2
         return Reply(answer, response_time_s(delay))
 
-    def share_of_1(self, felt: Felt) -> float:
+    def share_of_1(self, felt: PerceivedStimulus) -> float:
         """Probability of answer 1."""
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         certain = _NORMAL.cdf(sign * self.d_prime(felt) / 2 - self.criterion_at(felt))
         return self.lapse + (1.0 - 2.0 * self.lapse) * certain
 
-    def share_right(self, felt: Felt) -> float:
+    def share_right(self, felt: PerceivedStimulus) -> float:
         """Probability of the right answer."""
         share_of_1 = self.share_of_1(felt)
         return share_of_1 if felt.direction_shown == 1 else 1.0 - share_of_1
 
-    def criterion_at(self, felt: Felt) -> float:
+    def criterion_at(self, felt: PerceivedStimulus) -> float:
         """c at this trial."""
         return self.criterion + self.criterion_per_100_trials * felt.trials_before / 100.0
 
-    def d_prime(self, felt: Felt) -> float:
+    def d_prime(self, felt: PerceivedStimulus) -> float:
         """Sensitivity to this stimulus."""
         detection = felt.phase is Phase.DETECTION
         if felt.frequency_hz > self.numb_above_hz and not detection:

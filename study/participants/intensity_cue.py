@@ -20,7 +20,7 @@ from statistics import NormalDist
 from protocols.trial import Phase
 from study.participants.chance import response_time_s, uniform
 from study.participants.detection import DETECTION_SLOPE
-from study.participants.observer import Felt, Reply
+from study.participants.observer import PerceivedStimulus, Reply
 from study.participants.psychometric_curve import WeibullCurve
 
 
@@ -36,7 +36,7 @@ class IntensityCue:
     detection_n: float = 0.1
     """Level at which the noise has grown by the square root of two, and threshold of detection."""
 
-    def reply(self, felt: Felt, seed: int) -> Reply:
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """The answer to one presentation."""
         luck, delay = uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
@@ -45,7 +45,7 @@ class IntensityCue:
         share_of_1 = NormalDist().cdf(sign * distance(felt.level_n) / 2 + self._roved(felt))
         return Reply(1 if luck < share_of_1 else 2, response_time_s(delay))
 
-    def _roved(self, felt: Felt) -> float:
+    def _roved(self, felt: PerceivedStimulus) -> float:
         """Felt strength beyond the memory, in standard deviations; a detection trial asks for no direction."""
         if felt.nominal_n is None or felt.phase is Phase.DETECTION:
             return 0.0

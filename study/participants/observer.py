@@ -8,7 +8,7 @@ from study.session.stimulus.delivered import Delivered
 
 
 @dataclass(frozen=True, slots=True)
-class Felt:
+class PerceivedStimulus:
     """One stimulus as far as a participant could perceive it, and its place in the session."""
 
     run: int
@@ -46,4 +46,4 @@ class Observer(Protocol):
     @property
     def name(self) -> str: ...
 
-    def reply(self, felt: Felt, seed: int) -> Reply: ...
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply: ...

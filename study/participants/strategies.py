@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from study.participants.chance import response_time_s, uniform
-from study.participants.observer import Felt, Reply
+from study.participants.observer import PerceivedStimulus, Reply
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,7 +12,7 @@ class Guesser:
 
     name: str
 
-    def reply(self, felt: Felt, seed: int) -> Reply:
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         luck, delay = uniform(felt, seed, 2)
         return Reply(1 if luck < 0.5 else 2, response_time_s(delay))
 
@@ -23,7 +23,7 @@ class Alternator:
 
     name: str
 
-    def reply(self, felt: Felt, seed: int) -> Reply:
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         _, delay = uniform(felt, seed, 2)
         return Reply(1 + felt.trials_before % 2, response_time_s(delay))
 
@@ -35,7 +35,7 @@ class Constant:
     name: str
     answer: int
 
-    def reply(self, felt: Felt, seed: int) -> Reply:
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         _, delay = uniform(felt, seed, 2)
         return Reply(self.answer, response_time_s(delay))
 
@@ -50,7 +50,7 @@ class Scripted:
     """1 = right, 0 = wrong; repeated, and begun one place later in every run. The default ends a published staircase
     at its 36th answer in run 0, slightly earlier or later in others."""
 
-    def reply(self, felt: Felt, seed: int) -> Reply:
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         _, delay = uniform(felt, seed, 2)
         right = self.script[(felt.run + felt.trial) % len(self.script)] == "1"
         return Reply(felt.direction_shown if right else 3 - felt.direction_shown, response_time_s(delay))

@@ -12,7 +12,7 @@ from statistics import NormalDist
 
 from study.participants.chance import response_time_s, uniform
 from study.participants.direction_feeler import DirectionFeeler
-from study.participants.observer import Felt, Reply
+from study.participants.observer import PerceivedStimulus, Reply
 
 _NORMAL = NormalDist()
 
@@ -29,7 +29,7 @@ class UnsureRepeater:
     looks: int = 5
     """Most presentations of one trial; then it is answered in any case."""
 
-    def reply(self, felt: Felt, seed: int) -> Reply:
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """The answer on all looks so far, and whether another is asked for."""
         delay, lapsed, coin = uniform(felt, seed, 4)[1:]
         evidence = self._evidence(felt, seed)
@@ -39,7 +39,7 @@ class UnsureRepeater:
         ask_again = abs(evidence) < self.unsure and felt.attempt + 1 < self.looks
         return Reply(answer, response_time_s(delay), ask_again)
 
-    def _evidence(self, felt: Felt, seed: int) -> float:
+    def _evidence(self, felt: PerceivedStimulus, seed: int) -> float:
         """Average of all looks minus the criterion, in standard errors."""
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         middle = sign * self.feeler.d_prime(felt) / 2.0 - self.feeler.criterion_at(felt)

@@ -22,6 +22,8 @@ class BeginWanted(Message):
 
 @dataclass(eq=False)
 class ResumeWanted(Message):
+    """Resume this session."""
+
     path: str
     """Path of the session's folder, here and below."""
 
@@ -56,6 +58,8 @@ class WatchWanted(Message):
 
 @dataclass(eq=False)
 class DiagnosisWanted(Message):
+    """Show this diagnosis."""
+
     path: str
     """Path of a diagnosis.json."""
 

@@ -59,6 +59,7 @@ NEXT = {"hapteq-dark": "hapteq-light", "hapteq-light": "hapteq-contrast", "hapte
 
 
 def register_themes(app: App[Any], chosen: str = DARK.name) -> None:
+    """Make all themes known to the application, and choose one."""
     for theme in THEMES:
         app.register_theme(theme)
     app.theme = chosen

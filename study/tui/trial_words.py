@@ -30,6 +30,7 @@ def run_key(question: Question) -> str:
 
 
 def progress_sentence(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
+    """Share of the session that is done, and the minutes left where they are known."""
     share, minutes = round(100 * progress.share_done), progress.minutes_left
     if minutes is None:
         return words.fill("done", {"share": share})
@@ -37,6 +38,7 @@ def progress_sentence(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
 
 
 def plan(notice: Welcome, words: Words = ENGLISH_WORDS) -> str:
+    """How many runs the sitting has."""
     if not notice.runs:
         return words["plan_training"]
     return words.counted("plan_training_runs" if notice.training_runs else "plan_runs", notice.runs)
@@ -75,4 +77,5 @@ def origin(form: Form, words: Words = ENGLISH_WORDS) -> str:
 
 
 def limits_words(limits: Limits, words: Words = ENGLISH_WORDS) -> str:
+    """The range of a number in a form."""
     return words.fill("form_number", {"lowest": f"{limits.lowest:g}", "highest": f"{limits.highest:g}"})

@@ -24,6 +24,7 @@ RELOAD_S = 10.0
 
 THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")
 TOKEN_BYTES = 32
+"""Random bytes in the address: it cannot be guessed."""
 
 
 class ScreenServer(Server):

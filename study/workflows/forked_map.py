@@ -21,7 +21,7 @@ from time import perf_counter, process_time
 from types import CodeType
 from typing import Any, TypeVar
 
-from equalizer.effects.effect import Effect, living_effects
+from equalizer.effects.effect import Effect, effects_by_address
 
 Result = TypeVar("Result")
 WORTH_S = 0.1
@@ -69,7 +69,7 @@ def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: 
 
 
 @contextmanager
-def unforked() -> Iterator[None]:
+def without_forking() -> Iterator[None]:
     """Within this context nothing is forked, for workers whose neighbours use the other cores. The results are the
     same."""
     _within.append(True)
@@ -84,7 +84,7 @@ class _Shared:
 
     def __init__(self, function: Callable[..., Any], pieces: Sequence[tuple[Any, ...]]) -> None:
         self._function, self._pieces = function, pieces
-        self._known = living_effects()
+        self._known = effects_by_address()
         self._stride = -(-len(pieces) // _MOST_TOKENS)
         self._tokens, end = os.pipe()
         for first in range(0, len(pieces), self._stride):
@@ -96,7 +96,7 @@ class _Shared:
         try:
             while len(children) < others and self._fork_worker(children):
                 pass
-            with unforked():
+            with without_forking():
                 found = self._take_pieces(guarded=False)
             while children:
                 found.update(_receive(children[0][1], self._known))

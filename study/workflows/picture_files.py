@@ -13,6 +13,7 @@ from study.store.disk.text_file import write_text
 from study.workflows.forked_map import map_forked
 
 FIGURE_DPI = 150
+"""Resolution of PNG files (dots per inch)."""
 
 
 def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:

@@ -140,7 +140,7 @@ def watched_screen(protocol: str, data: str, news: int) -> None:
     from study.tui.app.app_start import AppStart
     from study.tui.engine.to_engine import Begin, SessionOrder
 
-    class Watched(HapteqApp):
+    class FollowedSession(HapteqApp):
         async def on_mount(self) -> None:
             self._watchdog = asyncio.create_task(self._watch())
 
@@ -156,7 +156,7 @@ def watched_screen(protocol: str, data: str, news: int) -> None:
                     told = state
                     os.write(news, f"{state} {late_ms:.1f}\n".encode())
 
-    app = Watched(AppStart(data, "simulated", first=Begin(SessionOrder(protocol, "simulated", "B01", data, 4))))
+    app = FollowedSession(AppStart(data, "simulated", first=Begin(SessionOrder(protocol, "simulated", "B01", data, 4))))
     try:
         app.run()
     finally:

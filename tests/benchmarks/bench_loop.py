@@ -20,11 +20,11 @@ import numpy as np
 from study.devices.clock import RealClock
 from study.devices.device import Health
 from study.devices.drive.stepped_runner import SteppedRunner
-from study.devices.force_dimension.halves import LIBRARY
+from study.devices.force_dimension.tick_io import LIBRARY
 from study.devices.governor import cells
 from study.devices.governor.governor import Governor
 from study.devices.safe import SafeDevice
-from study.workflows.checks.bare_loop import judge_beside, timed_beside
+from study.workflows.checks.bare_loop import judge_beside, run_bare_loop_beside
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import rigs
@@ -137,7 +137,10 @@ def main() -> int:
         )
         good &= ours_us <= ALLOWED * c_us
         for way in ("compiled", "from Python"):
-            with vendor_stub.copied(compiled, folder / way) as stub, timed_beside(TIMED_S, rigs.RATE_HZ, True) as bare:
+            with (
+                vendor_stub.copied(compiled, folder / way) as stub,
+                run_bare_loop_beside(TIMED_S, rigs.RATE_HZ, True) as bare,
+            ):
                 stub.set("watchdog_stretch", 10)
                 rig = stub.rig(sensed=False)
                 health = timed(rig if way == "compiled" else Interpreted(rig))

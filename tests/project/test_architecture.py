@@ -1,5 +1,6 @@
 """What docs/architecture.md and docs/contributing.md say of the structure is so."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -32,7 +33,27 @@ def test_every_path_in_a_page_exists(page):
     assert [path for path in paths if not (ROOT / path).exists()] == []
 
 
+def test_every_function_that_a_page_points_to_is_in_that_file():
+    text = (DOCS / "contributing.md").read_text("utf-8")
+    pointers = re.findall(r"`([a-z0-9_/]+\.py)`, function `(\w+)`", text)
+    assert len(pointers) > 3
+    assert [(path, name) for path, name in pointers if f"\ndef {name}(" not in (ROOT / path).read_text("utf-8")] == []
+
+
 @pytest.mark.parametrize("room", sorted(rooms()))
 def test_a_room_says_what_is_in_it(room):
     said = (ROOT / room / "__init__.py").read_text("utf-8")
     assert said.startswith('"""') and len(said) > 40
+
+
+MODULES = {
+    part for package in PACKAGES for path in (ROOT / package).rglob("*.py") for part in (path.stem, path.parent.name)
+}
+
+
+@pytest.mark.parametrize("room", sorted(rooms()))
+def test_what_a_room_names_is_a_module_or_stands_in_it(room):
+    opening = ast.get_docstring(ast.parse((ROOT / room / "__init__.py").read_text("utf-8"))) or ""
+    sources = [path.read_text("utf-8") for path in (ROOT / room).rglob("*.py")]
+    named = set(re.findall(r"`([a-z_0-9]+)(?:\.py)?`", opening)) - MODULES
+    assert {name for name in named if not any(re.search(rf"\b{name}\b *(\(|:|=)", text) for text in sources)} == set()

@@ -35,7 +35,6 @@ SMALL_BESIDE_THEIR_IMPORTER = {
     "study/tui/app/load_screens.py",
     "study/tui/app/outcomes.py",
     "study/workflows/diagnosis/clean_recordings.py",
-    "study/workflows/diagnosis/spring_in_model.py",
 }
 
 

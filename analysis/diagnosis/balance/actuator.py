@@ -19,13 +19,13 @@ import numpy as np
 
 from analysis.diagnosis.balance.command_laws import (
     AS_COMMANDED,
-    AnyCommandLaw,
     CommandLaw,
-    any_curve,
-    any_pull,
+    PiecewiseCommandLaw,
     coil_laws,
     command_laws,
     neighbours_of,
+    piecewise_curve,
+    piecewise_pull,
     slew_laws,
 )
 from analysis.diagnosis.balance.inverse_balance import InverseBalance
@@ -153,7 +153,7 @@ def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str],
     return Actuator(law, judged, bool(beside) and as_little, suffices=as_little and alone <= plain)
 
 
-Kinds = Sequence[tuple[AnyCommandLaw | None, Sequence[CommandLaw]]]
+Kinds = Sequence[tuple[PiecewiseCommandLaw | None, Sequence[CommandLaw]]]
 """Laws of the command of one kind, and a sum of functions that approximates each of them; None = there is none."""
 
 
@@ -165,13 +165,13 @@ def _kinds_of_laws(regression: Regression, rotational: bool, without: frozenset[
     if not np.any(command):
         return ()
     whole = [motion.force[:, regression.axis] for motion in motions]
-    kinds: list[tuple[AnyCommandLaw | None, list[CommandLaw]]] = [
-        (any_curve(command), list(command_laws(command))),
+    kinds: list[tuple[PiecewiseCommandLaw | None, list[CommandLaw]]] = [
+        (piecewise_curve(command), list(command_laws(command))),
         (None, list(slew_laws(whole, motions[0].rate_hz))),
     ]
     if motions[0].order == 0 and not rotational:
         position = np.concatenate([motion.position[motion.fit, own] for motion in motions])
-        kinds.append((any_pull(position), list(coil_laws(position))))
+        kinds.append((piecewise_pull(position), list(coil_laws(position))))
     allowed = [(near, [law for law in laws if law.effect not in without]) for near, laws in kinds]
     return [kind for kind in allowed if kind[1]]
 
@@ -228,8 +228,10 @@ def _best_of_each(
     refined = [
         (error, replace(law, values=values)) for (_, law), (error, values) in zip(best.values(), moved, strict=True)
     ]
-    plain = min((error for error, law in refined if not law.rich), default=np.inf)
-    return [(error, law) for error, law in refined if not law.rich or error < (1 - COMMAND_RIVAL_LEAVES_MORE) * plain]
+    plain = min((error for error, law in refined if not law.flexible), default=np.inf)
+    return [
+        (error, law) for error, law in refined if not law.flexible or error < (1 - COMMAND_RIVAL_LEAVES_MORE) * plain
+    ]
 
 
 def _refined_values(

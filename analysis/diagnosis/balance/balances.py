@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.actuator import DrivenAxis, find_balance
-from analysis.diagnosis.balance.actuator_twins import doubt_laws_of_actuator
+from analysis.diagnosis.balance.actuator_equivalents import doubt_laws_of_actuator
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motion_band_hz, motions_of
@@ -69,7 +69,7 @@ def motions_in_own_band(records: Sequence[Observed], motions: Sequence[Motion]) 
 def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
     """Masks of the samples in which the device moves; empty where it moves most of the time. At rest, friction balances
     any force: no law predicts it, and linear terms would replace it."""
-    moving = [_moves(motion, motions) for motion in motions]
+    moving = [_is_moving(motion, motions) for motion in motions]
     if np.mean(np.concatenate(moving)) > MOVES_MOST_OF_THE_TIME:
         return ()
     return [
@@ -78,7 +78,7 @@ def samples_in_motion(records: Sequence[Observed], motions: Sequence[Motion]) ->
     ]
 
 
-def _moves(motion: Motion, motions: Sequence[Motion]) -> Mask:
+def _is_moving(motion: Motion, motions: Sequence[Motion]) -> Mask:
     """(n,): whether any channel is faster than the threshold for standstill."""
     squares = np.concatenate([each.velocity[each.fit] ** 2 for each in motions]).mean(axis=0)
     return np.asarray((motion.velocity**2 > STILL_SHARE * squares).any(axis=1))

@@ -23,9 +23,9 @@ class Block:
     """A block of consecutive samples as products: of the columns with each other and with the force."""
 
     gram: FloatArray
-    """(k, k)"""
-    pull: FloatArray
-    """(k,)"""
+    """(k, k): X'X of the columns X."""
+    cross: FloatArray
+    """(k,): X'y, the cross products of the columns with the force y."""
     power: float
     """Sum of squares of the force."""
     signal: float
@@ -64,7 +64,7 @@ def blocks_of(
 def block_products(block: Block, columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Gram matrix (k, k) and cross products (k,) of k chosen columns of a block."""
     at = list(columns)
-    return block.gram[np.ix_(at, at)], block.pull[at]
+    return block.gram[np.ix_(at, at)], block.cross[at]
 
 
 def products_per_block(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
@@ -72,55 +72,55 @@ def products_per_block(blocks: Sequence[Block], columns: Sequence[int]) -> tuple
     at = np.asarray(columns, dtype=np.intp)
     grid = at[:, None], at[None, :]
     grams = np.array([block.gram[grid] for block in blocks]).reshape(-1, len(at), len(at))
-    return grams, np.array([block.pull[at] for block in blocks]).reshape(-1, len(at))
+    return grams, np.array([block.cross[at] for block in blocks]).reshape(-1, len(at))
 
 
 def summed_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Gram matrix (k, k) and cross products (k,) of k chosen columns, summed over the blocks."""
-    grams, pulls = products_per_block(blocks, columns)
-    return np.asarray(grams.sum(axis=0)), np.asarray(pulls.sum(axis=0))
+    grams, crosses = products_per_block(blocks, columns)
+    return np.asarray(grams.sum(axis=0)), np.asarray(crosses.sum(axis=0))
 
 
 def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
     """Weights (..., c) of stacked systems with Gram matrices (..., c, c) and cross products (..., c). ridge: over the
     mean diagonal element."""
-    gram, pull = products
+    gram, cross = products
     count = gram.shape[-1]
     size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / count
-    return np.asarray(np.linalg.solve(gram + (ridge * size + 1e-300) * np.eye(count), pull[..., None])[..., 0])
+    return np.asarray(np.linalg.solve(gram + (ridge * size + 1e-300) * np.eye(count), cross[..., None])[..., 0])
 
 
-def solve_without_columns(gram: FloatArray, pull: FloatArray, fixed: Mask) -> FloatArray:
+def solve_without_columns(gram: FloatArray, cross: FloatArray, fixed: Mask) -> FloatArray:
     """Solve the normal equations as `solve_normal_equations` does, with the weights of `fixed` columns held at zero."""
     free = np.flatnonzero(~fixed)
-    found = np.zeros_like(pull)
-    found[..., free] = solve_normal_equations((gram[..., free[:, None], free], pull[..., free]), RIDGE)
+    found = np.zeros_like(cross)
+    found[..., free] = solve_normal_equations((gram[..., free[:, None], free], cross[..., free]), RIDGE)
     return found
 
 
 def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
     """Solve the normal equations by ridge regression: the ridge acts on the columns that are not `free`."""
-    gram, pull = products
+    gram, cross = products
     size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
-    return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge)) * size, pull[..., None])[..., 0])
+    return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge)) * size, cross[..., None])[..., 0])
 
 
 def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[FloatArray, FloatArray]:
     """The normal equations with the prior's precision added. products: (..., c, c) and (..., c)."""
     if prior is None:
         return products
-    gram, pull = products[0].copy(), products[1].copy()
+    gram, cross = products[0].copy(), products[1].copy()
     first = np.arange(len(prior[0]))
     gram[..., first, first] += prior[0]
-    pull[..., first] += prior[1]
-    return gram, pull
+    cross[..., first] += prior[1]
+    return gram, cross
 
 
 def squared_error(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
     """Residual sum of squares of given weights, at least 0. own: Gram matrix and cross products; power: sum of squares
     of what is fitted."""
-    gram, pull = own
-    return max(power - 2 * float(weights @ pull) + float(weights @ gram @ weights), 0.0)
+    gram, cross = own
+    return max(power - 2 * float(weights @ cross) + float(weights @ gram @ weights), 0.0)
 
 
 def squared_errors(blocks: Sequence[Block], own: tuple[FloatArray, FloatArray], weights: FloatArray) -> FloatArray:

@@ -16,9 +16,11 @@ from equalizer.effects.force_nonlinearity import square_law_force
 from equalizer.effects.slew_limit import limit_slew
 from equalizer.signals.signal import FloatArray
 
-DEAD, FULL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
+DEADBAND_QUANTILES, SATURATION_QUANTILES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (
+    0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98,
+)  # fmt: skip
 """Quantiles of the command's size at which a dead band ends, and at which an actuator saturates."""
-STARTS = (0.05, 0.1, 0.2, 0.3)
+CURVE_QUANTILES = (0.05, 0.1, 0.2, 0.3)
 """Quantiles of the command's size at which a curve begins."""
 POWERS = (0.3, 0.5, 0.7, 1.4, 2.0)
 """Exponents of the command beyond that point: valves and magnets that saturate, propellers."""
@@ -27,12 +29,12 @@ SQUARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
 GAPS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 """Smallest distance of a magnet from its armature, relative to the travel: beyond it, its force falls by less than half
 over the travel. A magnet held by a spring stays within a third of the gap, which is 2 here."""
-CLOSER = (0.95, 0.98, 1.02, 1.05)
+REFINING_FACTORS = (0.95, 0.98, 1.02, 1.05)
 """Factors on a parameter in a coordinate search."""
-MOVED = ("width", "limit", "square", "gap", "power", "rate")
+REFINED_PARAMETERS = ("width", "limit", "square", "gap", "power", "rate")
 RATES = 20
 """Number of slew limits that are tried."""
-BENDS = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
+NODE_QUANTILES = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
 """Quantiles at which a piecewise linear function has its nodes; at those of the command's size it may jump, too."""
 
 
@@ -47,9 +49,9 @@ class CommandLaw:
     """Columns (n, weights) of a command (n,): their weighted sum is the force; a single column is the force up to a
     gain."""
     pull: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
-    """(n,): factor of the force at each position; None = it is the same everywhere."""
-    rich: bool = False
-    """Whether it has more freedom than the plain laws, and counts only with a clearly smaller error."""
+    """(n,): factor of the force at each position; None = it does not depend on the position."""
+    flexible: bool = False
+    """Whether it has more freedom than the other laws, and counts only with a clearly smaller error."""
     scale: float = 1.0
     """Scale that converts a single column to a force."""
     formula: Callable[[dict[str, float], float], Formula] | None = None
@@ -80,22 +82,22 @@ AS_COMMANDED = CommandLaw("as_commanded", {}, lambda u, _: u[:, None])
 
 
 def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
-    """command: (n,), known throughout."""
+    """All static nonlinearities of the actuator, over their grids of parameters. command: (n,), known throughout."""
     size = np.abs(command)
-    for width in _sizes(size, DEAD):
+    for width in _sizes(size, DEADBAND_QUANTILES):
         for jump in (0.0, 1.0):
             yield CommandLaw("force_deadband", {"width": width, "jump": jump}, _deadband_force)
-    for limit in _sizes(size, FULL):
+    for limit in _sizes(size, SATURATION_QUANTILES):
         yield CommandLaw(
             "force_saturation", {"limit": limit}, lambda u, of: np.clip(u, -of["limit"], of["limit"])[:, None]
         )
     unit = float(size.max(initial=0.0)) or 1.0
     for square in SQUARES:
         yield CommandLaw("force_nonlinearity", {"square": square, "reference": unit}, _nonlinear_force)
-    for width in (0.0, *_sizes(size, STARTS)):
+    for width in (0.0, *_sizes(size, CURVE_QUANTILES)):
         for power in POWERS:
             values = {"width": width, "power": power}
-            yield CommandLaw("actuator_curve", values, _power_force, rich=True, formula=_power_formula)
+            yield CommandLaw("actuator_curve", values, _power_force, flexible=True, formula=_power_formula)
     yield CommandLaw("actuator_asymmetry", {}, lambda u, _: np.stack([u, np.abs(u)], axis=1))
 
 
@@ -144,10 +146,10 @@ def _force_of_square(command: FloatArray, of: dict[str, float]) -> FloatArray:
 
 
 def neighbours_of(law: CommandLaw) -> Iterator[CommandLaw]:
-    """The law with each number of `MOVED` that is not zero multiplied by each factor of `CLOSER`."""
-    for name in MOVED:
+    """The law with each of its `REFINED_PARAMETERS` that is not zero multiplied by each of the `REFINING_FACTORS`."""
+    for name in REFINED_PARAMETERS:
         value = law.values.get(name, 0.0)
-        for factor in CLOSER if value else ():
+        for factor in REFINING_FACTORS if value else ():
             if name != "square" or abs(factor * value) <= 1:
                 yield replace(law, values={**law.values, name: factor * value})
 
@@ -173,7 +175,7 @@ def _deadband_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AnyCommandLaw:
+class PiecewiseCommandLaw:
     """A sum of simple functions that approximates any law of a kind: where it is no better than the command itself,
     none of the laws need be tried."""
 
@@ -186,10 +188,10 @@ class AnyCommandLaw:
         return self.columns(command, position)
 
 
-def any_curve(command: FloatArray) -> AnyCommandLaw:
+def piecewise_curve(command: FloatArray) -> PiecewiseCommandLaw:
     """A piecewise linear function of the command with jumps, separate for each sign. command: (n,), whose range the
     nodes span."""
-    bends = np.unique(np.quantile(np.abs(command), BENDS))
+    bends = np.unique(np.quantile(np.abs(command), NODE_QUANTILES))
 
     def columns(u: FloatArray, position: FloatArray) -> FloatArray:
         sides = (np.maximum(u, 0.0), np.maximum(-u, 0.0))
@@ -197,16 +199,16 @@ def any_curve(command: FloatArray) -> AnyCommandLaw:
         jumps = [np.where(side > bend, 1.0, 0.0) for side in sides for bend in bends]
         return np.stack([u, sides[0], *beyond, *jumps], axis=1)
 
-    return AnyCommandLaw(columns, 2 + 2 * len(bends))
+    return PiecewiseCommandLaw(columns, 2 + 2 * len(bends))
 
 
-def any_pull(position: FloatArray) -> AnyCommandLaw:
+def piecewise_pull(position: FloatArray) -> PiecewiseCommandLaw:
     """The command and its square, each with a gain that is piecewise linear in the position. position: (n,), whose
     range the nodes span."""
-    bends = np.unique(np.quantile(position, BENDS))
+    bends = np.unique(np.quantile(position, NODE_QUANTILES))
 
     def columns(u: FloatArray, x: FloatArray) -> FloatArray:
         gains = [np.ones_like(x), x - bends[0], *(np.maximum(x - bend, 0.0) for bend in bends)]
         return np.stack([force * gain for force in (u, u**2) for gain in gains], axis=1)
 
-    return AnyCommandLaw(columns, 4 + 2 * len(bends))
+    return PiecewiseCommandLaw(columns, 4 + 2 * len(bends))

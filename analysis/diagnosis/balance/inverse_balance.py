@@ -1,4 +1,9 @@
-"""The force balance solved for the acceleration: errors with a law of the command in place of the command."""
+"""The force balance solved for the acceleration: tests of laws of the actuator.
+
+The force balance M a + D v + K x + (laws of the motion) = f(u) predicts the force from the motion. A nonlinear actuator
+f(u) cannot be a column there, because the command u is on the predicted side. Solved for the acceleration,
+a = (f(u) - D v - K x - ...) / M, it can: functions of the command replace the command as a predictor.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,7 +47,7 @@ class InverseBalance:
 
     search: StructureSearch
     map_: Mapper
-    rubs: bool
+    has_friction: bool
     """Whether friction is among the laws of the motion: samples at rest are then no evidence, because friction balances
     any force up to its level, and a dead band gives none."""
     target: int | None = None
@@ -66,15 +71,15 @@ class InverseBalance:
     def least_error(self, law: ForceOfCommand, beside: Sequence[int]) -> float:
         """Sum of squares on the fitted samples: a lower bound for each law that this sum approximates."""
         fit, _ = self._blocks(self._rows(law, beside), False)
-        products = [block_products(block, range(len(fit[0].pull))) for block in fit]
-        weights = solve_normal_equations(summed_products(fit, range(len(fit[0].pull))), RIDGE)
+        products = [block_products(block, range(len(fit[0].cross))) for block in fit]
+        weights = solve_normal_equations(summed_products(fit, range(len(fit[0].cross))), RIDGE)
         return sum(squared_error(own, weights, block.power) for own, block in zip(products, fit, strict=True))
 
     def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
         """(blocks,): sums of squares. judged: on the held-out blocks; else on each fold."""
         tested = judged and blocks_to_judge(self.search.regression) is self.search.regression.test
         fit, test = self._blocks(self._rows(law, laws), tested)
-        columns = list(range(len(fit[0].pull)))
+        columns = list(range(len(fit[0].cross)))
         whole = summed_products(fit, columns)
         if tested:
             weights = solve_normal_equations(whole, RIDGE)
@@ -106,7 +111,7 @@ class InverseBalance:
         regression = self.search.regression
         speeds = [motion.velocity[:, regression.beside.own] for motion in regression.motions]
         used = np.concatenate([speed[motion.fit] for speed, motion in zip(speeds, regression.motions, strict=True)])
-        least = STILL_SHARE * float(np.mean(used**2)) if self.rubs else -1.0
+        least = STILL_SHARE * float(np.mean(used**2)) if self.has_friction else -1.0
         return [speed**2 > least for speed in speeds]
 
     def _rows(self, law: ForceOfCommand, laws: Sequence[int]) -> list[FloatArray]:

@@ -22,8 +22,7 @@ from analysis.diagnosis.balance.judged_law import (
 )
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
-from analysis.diagnosis.balance.simplest_structure import numbers_of, simplest_structure
-from analysis.diagnosis.balance.structures import Structure, StructureSearch, values_of
+from analysis.diagnosis.balance.structures import Structure, StructureSearch, numbers_of, simplest_structure, values_of
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
     FURTHER_LAW_GAIN,
@@ -93,6 +92,7 @@ class Balance:
 
 
 def judge_laws(search: StructureSearch) -> Balance:
+    """The simplest structure of a search with each law tested on held-out blocks, and named or not."""
     regression = search.regression
     if not blocks_to_judge(regression):
         alone = float(np.sqrt(search.linear.error / _signal_power(regression)))

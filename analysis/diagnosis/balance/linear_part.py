@@ -14,13 +14,13 @@ from analysis.diagnosis.balance.blocks import blocks_of
 from analysis.diagnosis.balance.law import BaseTerms
 from analysis.diagnosis.balance.motion import Motion, filter_spectrum
 from analysis.diagnosis.balance.regression import Regression, keep_laws, regression_of
-from analysis.diagnosis.balance.simplest_structure import simplest_structure
 from analysis.diagnosis.balance.structures import (
     Structure,
     StructureSearch,
     is_better,
     refine_numbers,
     search_structures,
+    simplest_structure,
     values_of,
 )
 from analysis.diagnosis.settings import LINEAR_LAW_GAIN, LINEAR_PART_ROUNDS, MOST_LINEAR_LAWS

@@ -40,12 +40,12 @@ def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence
     columns = [each[:, varying] for each in given.columns]
     plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)
     scale = plain.scale[: plain.base - 1]
-    precision, pull = np.zeros(len(scale)), np.zeros(len(scale))
+    precision, cross = np.zeros(len(scale)), np.zeros(len(scale))
     precision[0] = FIXED * sum(block.gram[0, 0] for block in plain.fit)
-    pull[0] = precision[0] * scale[0]
-    free = replace(plain, prior=(precision.copy(), pull))
+    cross[0] = precision[0] * scale[0]
+    free = replace(plain, prior=(precision.copy(), cross))
     precision[1:] = _power_per_freedom(free) / scale[1:] ** 2
-    return replace(plain, prior=(precision, pull))
+    return replace(plain, prior=(precision, cross))
 
 
 def takes_enough(plain: Regression, least: float) -> bool:
@@ -62,9 +62,9 @@ def _sensitive_columns(given: GivenBase) -> list[int]:
 
 def _power_per_freedom(plain: Regression) -> float:
     """Residual sum of squares over its degrees of freedom, with the free parameters fitted without their prior."""
-    left = plain.remainder(plain.columns_of(()))
+    residuals = plain.remainder(plain.columns_of(()))
     power, freedom = 0.0, 0.0
-    for residual, motion in zip(left, plain.motions, strict=True):
+    for residual, motion in zip(residuals, plain.motions, strict=True):
         known_residual = np.where(motion.valid_samples(motion.fit), residual, 0.0)
         lines = np.abs(np.fft.rfft(known_residual)) ** 2
         power += float(known_residual @ known_residual)

@@ -97,13 +97,13 @@ def motion_signal(recording: Recording) -> Signal | None:
         if not known:
             continue
         lowest = min(known)
-        places = [k for k, order in enumerate(orders) if order == lowest and _moves(signal.samples[:, k])]
+        places = [k for k, order in enumerate(orders) if order == lowest and _varies(signal.samples[:, k])]
         if places:
             found.append((lowest, signal.select_channels(places)))
     return min(found, key=lambda item: item[0])[1] if found else None
 
 
-def _moves(samples: FloatArray) -> bool:
+def _varies(samples: FloatArray) -> bool:
     """Whether the finite samples change."""
     known = samples[np.isfinite(samples)]
     return bool(len(known)) and float(np.ptp(known)) > 0

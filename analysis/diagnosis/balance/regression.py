@@ -92,7 +92,7 @@ class Regression:
     def _solve_nonnegative(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Weights (..., c) from products (..., c, c) and (..., c): least squares with mass and damping of the driven
         motion held at zero where they would be negative (active set)."""
-        gram, pull = products = with_prior(products, self.prior)
+        gram, cross = products = with_prior(products, self.prior)
         found = solve_normal_equations(products, RIDGE)
         places = list(self.positive)
         bound: Mask = np.zeros_like(found, dtype=np.bool_)
@@ -104,7 +104,7 @@ class Regression:
             for fixed in np.unique(bound.reshape(-1, bound.shape[-1]), axis=0):
                 if fixed.any():
                     at = (bound == fixed).all(axis=-1)
-                    found[at] = solve_without_columns(gram[at], pull[at], fixed)
+                    found[at] = solve_without_columns(gram[at], cross[at], fixed)
         return np.where(bound, 0.0, found)
 
     def remainder(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
@@ -247,17 +247,17 @@ def keep_laws(regression: Regression, laws: Sequence[int]) -> Regression:
 
 
 def _select_columns(block: Block, columns: Sequence[int]) -> Block:
-    return replace(block, gram=block.gram[np.ix_(columns, columns)], pull=block.pull[list(columns)])
+    return replace(block, gram=block.gram[np.ix_(columns, columns)], cross=block.cross[list(columns)])
 
 
 def _renew_products(regression: Regression, block: Block, place: slice) -> Block:
     """The block with the products of the columns in `place` recomputed."""
     x = regression.columns[block.motion][block.rows] / regression.scale
-    gram, pull = block.gram.copy(), block.pull.copy()
+    gram, cross = block.gram.copy(), block.cross.copy()
     gram[:, place] = x.T @ x[:, place]
     gram[place, :] = gram[:, place].T
-    pull[place] = x[:, place].T @ regression.force[block.motion][block.rows]
-    return replace(block, gram=gram, pull=pull)
+    cross[place] = x[:, place].T @ regression.force[block.motion][block.rows]
+    return replace(block, gram=gram, cross=cross)
 
 
 def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float, FloatArray]:

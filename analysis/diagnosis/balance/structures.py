@@ -1,5 +1,7 @@
-"""Sums of one to three laws that explain a force along a measured motion, by a beam search over cross-validated
-errors."""
+"""Sums of one to three laws that explain a force along a measured motion, by a beam search over cross-validated errors.
+
+`simplest_structure` then selects, among the ranked sums, the fewest parameters at about the least error.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -10,8 +12,23 @@ from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, scales_of
 from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
 from analysis.diagnosis.balance.model_base import GivenBase, regression_beside_model, takes_enough
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
-from analysis.diagnosis.balance.regression import Regression, append_laws, keep_laws, regression_of, replace_law
-from analysis.diagnosis.settings import FURTHER_LAW_ERRORS, FURTHER_LAW_GAIN, MOST_SUMMED_LAWS, STRUCTURES_BEAM
+from analysis.diagnosis.balance.regression import (
+    Regression,
+    append_laws,
+    fit_all_laws,
+    keep_laws,
+    regression_of,
+    replace_law,
+)
+from analysis.diagnosis.settings import (
+    FURTHER_LAW_ERRORS,
+    FURTHER_LAW_GAIN,
+    FURTHER_LAW_OF_ALL,
+    FURTHER_LAW_OF_REST,
+    MOST_SUMMED_LAWS,
+    PLAINER_LEAVES,
+    STRUCTURES_BEAM,
+)
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
@@ -174,11 +191,11 @@ def _add_cogging_laws(first: Regression, scales: Sequence[Scales]) -> Regression
 
 def _add_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequence[int]) -> Regression:
     """The regression with cogging at the pitches that the residual of these laws shows."""
-    left = regression.remainder(regression.columns_of(laws))
+    residuals = regression.remainder(regression.columns_of(laws))
     more = [
         cogging_law(c, pitch, of)
         for c, of in enumerate(scales)
-        for pitch in likely_pitches(regression.motions, left, c, of)
+        for pitch in likely_pitches(regression.motions, residuals, c, of)
     ]
     return append_laws(regression, more) if more else regression
 
@@ -220,3 +237,52 @@ def _neighbours(law: Law) -> Iterator[Law]:
             if low <= value <= high:
                 numbers = (*law.numbers[:place], float(value), *law.numbers[place + 1 :])
                 yield replace(law, numbers=numbers)
+
+
+WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
+"""Laws whose only nonlinear number is the width of a smoothed sign."""
+
+
+def simplest_structure(search: StructureSearch) -> Structure:
+    """The structure with the fewest parameters whose cross-validated error is close to the smallest."""
+    allowed = search.best.error + PLAINER_LEAVES * (search.linear.error - search.best.error)
+    enough = [each for each in search.ranked if each.error <= allowed]
+    plain = min(enough, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=search.linear)
+    ceiling = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
+    while (richer := _add_further_laws(search, plain, ceiling)) is not None:
+        plain = richer
+    return plain
+
+
+def _add_further_laws(search: StructureSearch, plain: Structure, ceiling: float) -> Structure | None:
+    """The structure with further laws that explain most of what all laws together could still explain; None = none
+    such."""
+    allowed = plain.error - max(FURTHER_LAW_OF_REST * (plain.error - ceiling), FURTHER_LAW_OF_ALL * plain.error)
+    more = [
+        each
+        for each in search.ranked
+        if _extends(search.regression, plain.laws, each.laws) and each.error <= allowed and is_better(plain, each)
+    ]
+    return min(more, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=None)
+
+
+def _extends(regression: Regression, plain: Sequence[int], richer: Sequence[int]) -> bool:
+    """Whether these laws are the given ones and more; dry friction may be replaced by one that depends on a
+    condition."""
+    covered, known = set(richer), {regression.laws[number].key for number in richer}
+    for number in plain:
+        effect, channel = regression.laws[number].key
+        if effect == "coulomb_friction" and ("condition_dependent_friction", channel) in known:
+            covered.add(number)
+    return set(plain) < covered
+
+
+def numbers_of(regression: Regression, laws: Sequence[int]) -> int:
+    """Number of parameters of these laws. The width of a friction's smoothed sign is not counted, and gravity torque
+    counts for one less, because it replaces the spring."""
+    count = 0
+    for number in laws:
+        law, place = regression.laws[number], regression.places[number]
+        count += place.stop - place.start + (0 if law.effect in WIDTH_ALONE else len(law.numbers))
+        count -= law.effect == "gravity_torque"
+    return count

@@ -18,7 +18,7 @@ from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.forces.inverse_dynamics import band_motion, required_force
 from analysis.diagnosis.settings import LAW_OF_SIGNAL, MOTION_OVERSAMPLED
@@ -81,7 +81,7 @@ class _BalanceData:
 
 def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _BalanceData:
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
-    known = under_conditions(place_recorded_effects(model, recording), recording)
+    known = effects_under_conditions(place_recorded_effects(model, recording), recording)
     at = _structure(add_carried_weight(model, recording), known)
     whole = required_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     motion_of_axis = whole.axis_position, whole.axis_velocity, whole.axis_acceleration

@@ -123,8 +123,8 @@ def _confirm(begun: _Confirming, named: Sequence[tuple[int, JudgedLaw]]) -> tupl
             whole = begun.repeats and as_good_as_noise(explained) and test_error <= HELD_OUT_ERROR
             judged = Judgement("explained" if whole else "partly_explained", True)
             return SearchResult(begun.whole, explained, judged, errors=errors), named
-        simpler = None if errors is None else find_special_case(begun.balances, _without(named, vague), named[vague])
-        named = refit_laws(begun.balances, _without(named, vague, simpler))
+        simpler = None if errors is None else find_special_case(begun.balances, _remove_law(named, vague), named[vague])
+        named = refit_laws(begun.balances, _remove_law(named, vague, simpler))
     return None
 
 
@@ -132,8 +132,8 @@ def _prefer_special_case(begun: _Confirming, found: SearchResult, named: _Named)
     """The result with a law replaced by its special case where its further parameters are undetermined (such as a
     stiffness before sliding) and the error hardly rises; else unchanged."""
     for place in open_refinements(found, begun.constants):
-        simpler = find_special_case(begun.balances, _without(named, place), named[place])
-        other = None if simpler is None else _confirm(begun, _without(named, place, simpler))
+        simpler = find_special_case(begun.balances, _remove_law(named, place), named[place])
+        other = None if simpler is None else _confirm(begun, _remove_law(named, place, simpler))
         if other is None or len(other[1]) < len(named):
             continue
         if other[0].found.after.held_out <= found.found.after.held_out - np.log(CONFIRMED_LEAVES):
@@ -141,7 +141,7 @@ def _prefer_special_case(begun: _Confirming, found: SearchResult, named: _Named)
     return found
 
 
-def _without(named: _Named, place: int, instead: tuple[int, JudgedLaw] | None = None) -> _Named:
+def _remove_law(named: _Named, place: int, instead: tuple[int, JudgedLaw] | None = None) -> _Named:
     return [*named[:place], *([] if instead is None else [instead]), *named[place + 1 :]]
 
 

@@ -1,4 +1,9 @@
-"""Chooses the error measures in which the laws of a force balance are fitted, one after the other."""
+"""Chooses the error measures in which the laws of a force balance are fitted, one after the other.
+
+A linear model that was fitted to changes has no constants: neither the command at the operating point nor the zero of a
+sensor. Without them, its simulation has an offset far larger than the errors of its dynamics; so a constant is added to
+the commands (`about_operating_point`).
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -7,7 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.measured_motion import is_quasi_static, is_read_as_free
-from analysis.diagnosis.data.operating_point import about_operating_point, add_to_commands
+from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
 from analysis.diagnosis.errors.fit_score import fit_score
 from analysis.diagnosis.errors.hypothesis import NOTHING
@@ -17,8 +22,9 @@ from analysis.diagnosis.first_model.model_from_balance import first_model, share
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import CONSTANT_LEAVES, LAWS_WITHIN
-from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
+from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
+from equalizer.signals.signal import FloatArray
 
 ABOUT_MEAN = (
     "The fitted model holds no constants: one was added to the command, with which its mean error on what was fitted "
@@ -113,3 +119,36 @@ def list_fitting_measures(
             )
     except (MechanicalModelError, np.linalg.LinAlgError):
         return
+
+
+LEAST_STIFFNESS_RATIO = 1e-6
+"""Least ratio of the smallest to the largest stiffness for which a position is held at all."""
+
+
+def about_operating_point(recordings: Sequence[Recording], model: MechanicalModel) -> tuple[Recording, ...] | None:
+    """The recordings with a constant added to their commands, with which the model keeps the mean measured position of
+    the fit samples. None where the response is not a position, or no stiffness holds it."""
+    if DERIVATIVE_OF_QUANTITY[model.quantity] != 0:
+        return None
+    size = np.linalg.svd(model.stiffness, compute_uv=False)
+    if size[-1] <= LEAST_STIFFNESS_RATIO * size[0]:
+        return None
+    gain = model.output @ np.linalg.solve(model.stiffness, model.input)
+    pushed, stood = _means(recordings, model.outputs)
+    return add_to_commands(recordings, np.linalg.pinv(gain) @ stood - pushed)
+
+
+def add_to_commands(recordings: Sequence[Recording], constant: FloatArray) -> tuple[Recording, ...]:
+    """The recordings with a constant, (m,), added to every sample of their commands."""
+    return tuple(
+        replace(each, command=replace(each.command, samples=each.command.samples + constant)) for each in recordings
+    )
+
+
+def _means(recordings: Sequence[Recording], responses: int) -> tuple[FloatArray, FloatArray]:
+    """Means of commands (m,) and responses (p,) over the samples to fit and to choose by."""
+    records = observed_parts(recordings, responses)
+    masks = [record.fit | record.choose for record in records]
+    pushed = np.vstack([record.command[mask] for record, mask in zip(records, masks, strict=True)])
+    stood = np.vstack([record.recording.response.samples[mask] for record, mask in zip(records, masks, strict=True)])
+    return np.nanmean(pushed, axis=0), np.nanmean(stood, axis=0)

@@ -86,7 +86,7 @@ def constants_of(balances: Sequence[Balance]) -> Hypothesis:
 
 
 def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> Hypothesis:
-    """recording: whose channels a formula's signals are."""
+    """A named law of the balance as a hypothesis to simulate. recording: whose channels a formula's signals are."""
     if judged.formula is not None:
         # Imported here: few diagnoses have such a law.
         from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law

@@ -7,9 +7,9 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase, likely_step
+from analysis.diagnosis.contrast.compared_base import FEWEST_ROWS, Base
 from analysis.diagnosis.contrast.force_base import force_base
 from analysis.diagnosis.contrast.part import Part
-from analysis.diagnosis.contrast.stream import FEWEST_ROWS, Base
 from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, BALANCE_HOLDS, CONSTANT_SIGNAL, MOTIONS_APART
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording

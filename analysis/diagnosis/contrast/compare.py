@@ -17,6 +17,7 @@ from analysis.diagnosis.contrast.bases import (
     unexplained_share,
     unexplained_share_of_rows,
 )
+from analysis.diagnosis.contrast.compared_base import Base, ComparedBase, compare_base, rows_with_fault_undone
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
 from analysis.diagnosis.contrast.fault import Fault, Rows, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
@@ -33,7 +34,6 @@ from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
-from analysis.diagnosis.contrast.stream import Base, Stream, rows_with_fault_undone, stream_of
 from analysis.diagnosis.contrast.try_faults import ALL, Trial, Tried, allowed_sizes, try_faults
 from analysis.diagnosis.settings import (
     BALANCE_HOLDS,
@@ -63,28 +63,28 @@ def compare(
         return None
     for bases, motions in bases_of(*sides):
         with suppress(np.linalg.LinAlgError, ValueError):
-            streams, faults = _set_up(*sides, bases, motions)
-            trial = try_faults(streams, [fault for fault in faults if fault.effect not in without], time_left)
-            if not isinstance(bases[0], ForceBase) or _balances(streams, trial.tried):
-                return _judge_faults(streams, trial)
+            compared_bases, faults = _set_up(*sides, bases, motions)
+            trial = try_faults(compared_bases, [fault for fault in faults if fault.effect not in without], time_left)
+            if not isinstance(bases[0], ForceBase) or _balances(compared_bases, trial.tried):
+                return _judge_faults(compared_bases, trial)
     return None
 
 
 def _set_up(
     clean: tuple[Part, ...], faulty: tuple[Part, ...], bases: Sequence[Base], motions: tuple[Motion, ...]
-) -> tuple[list[Stream], list[Fault]]:
+) -> tuple[list[ComparedBase], list[Fault]]:
     recording = clean[0].recording
     by_force = isinstance(bases[0], ForceBase)
     timed = bool(motions) and np.isfinite(motions[0].band_hz)
     band_hz, step = (motions[0].band_hz, motions[0].step) if motions else (np.inf, 1)
     table = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
-    streams = [stream_of(base, clean, faulty) for base in bases]
+    compared_bases = [compare_base(base, clean, faulty) for base in bases]
     for base in sensor_bases(clean, band_hz, step):
         with suppress(ValueError):  # too few valid rows: the other bases are compared
-            streams.append(stream_of(base, clean, faulty))
-    row_s = streams[0].row_s
+            compared_bases.append(compare_base(base, clean, faulty))
+    row_s = compared_bases[0].row_s
     lag_samples = 1 if by_force else round(row_s * clean[0].rate_hz)
-    rows = Rows(lag_samples, likely_delays_s(streams), LATE_STEP * row_s, likely_clock_rates(streams))
+    rows = Rows(lag_samples, likely_delays_s(compared_bases), LATE_STEP * row_s, likely_clock_rates(compared_bases))
     faults: list[Fault] = []
     turns = is_rotational(recording)
     for axis, name in enumerate(recording.command.channels):
@@ -98,34 +98,36 @@ def _set_up(
         faults += faults_of_all((*clean, *faulty), rows)
     if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"}:
         faults.append(sensor_misalignment())
-    return streams, faults
+    return compared_bases, faults
 
 
-def _judge_faults(streams: Sequence[Stream], trial: Trial) -> Comparison:
+def _judge_faults(compared_bases: Sequence[ComparedBase], trial: Trial) -> Comparison:
     bare = trial.bare
     plain = fit_sizes(bare, None)
-    own = sum(stream.other.count for stream in streams)
-    samples = own + sum(stream.clean.count for stream in streams)
+    own = sum(compared.faulty.count for compared in compared_bases)
+    samples = own + sum(compared.clean.count for compared in compared_bases)
     weighed = sorted(
-        (_judge_fault(streams, found, plain, samples) for found in trial.tried),
+        (_judge_fault(compared_bases, found, plain, samples) for found in trial.tried),
         key=lambda each: float(each.errors.sum()),
     )
     apart = zip(SIXTHS, _leave_out_blocks(bare), strict=True)
     held = sum(held_out_error(kept, np.zeros(0), out) for out, kept in apart)
     blocks = [pair.without for pair in bare], [pair.with_it.blocks for pair in bare]
     usual = [max(_excesses_within_a_set([np.array(products) for products in side])) for side in blocks]
-    first = streams[0]
+    first = compared_bases[0]
     return Comparison(
-        tuple(weighed), plain.errors, samples, own, held, min(unexplained_share(first.base, first.other.parts), 1.0),
+        tuple(weighed), plain.errors, samples, own, held, min(unexplained_share(first.base, first.faulty.parts), 1.0),
         max(usual), usual[0], isinstance(first.base, ForceBase), first.row_s, trial.complete,
     )  # fmt: skip
 
 
-def _balances(streams: Sequence[Stream], tried: Sequence[Tried]) -> bool:
+def _balances(compared_bases: Sequence[ComparedBase], tried: Sequence[Tried]) -> bool:
     """Whether the force balance fits the faulty set, with nothing or with the best fault undone. tried: the best
     first."""
-    device = [stream for stream in streams if isinstance(stream.base, ForceBase)]
-    if all(unexplained_share_of_rows(each.base, each.other.rows, each.other.masks) < BALANCE_HOLDS for each in device):
+    device = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
+    if all(
+        unexplained_share_of_rows(each.base, each.faulty.rows, each.faulty.masks) < BALANCE_HOLDS for each in device
+    ):
         return True
     return any(
         all(unexplained_share_of_rows(each.base, *_undo(each, found)) < BALANCE_HOLDS for each in device)
@@ -133,12 +135,12 @@ def _balances(streams: Sequence[Stream], tried: Sequence[Tried]) -> bool:
     )
 
 
-def _undo(stream: Stream, found: Tried) -> tuple[list[FloatArray], list[Mask]]:
+def _undo(compared: ComparedBase, found: Tried) -> tuple[list[FloatArray], list[Mask]]:
     """The rows of the faulty set with a fault undone, and those of which something is left."""
     fit, fault, variant, _ = found
-    changed = rows_with_fault_undone(stream, stream.other, fault, variant)
-    rows, masks = list(stream.other.rows), list(stream.other.masks)
-    for k, (plain, mask) in enumerate(zip(stream.other.rows, stream.other.masks, strict=True)):
+    changed = rows_with_fault_undone(compared, compared.faulty, fault, variant)
+    rows, masks = list(compared.faulty.rows), list(compared.faulty.masks)
+    for k, (plain, mask) in enumerate(zip(compared.faulty.rows, compared.faulty.masks, strict=True)):
         rows[k] = plain + sum(size * (each.rows[k] - plain) for size, each in zip(fit.sizes, changed, strict=True))
         masks[k] = mask & ~np.any([each.lost[k] for each in changed if each.lost], axis=0)
     return rows, masks
@@ -146,7 +148,7 @@ def _undo(stream: Stream, found: Tried) -> tuple[list[FloatArray], list[Mask]]:
 
 def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
     """Ratio of the errors of a common base to those of separate bases for stretches of one set, less 1. sides: per
-    stream, products (blocks, k, k)."""
+    compared, products (blocks, k, k)."""
 
     def error(blocks: Sequence[int]) -> float:
         return sum(error_of_own_fit(side[list(blocks)].sum(axis=0)) for side in sides)
@@ -157,7 +159,7 @@ def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
         yield together / max(apart, 1e-300) - 1
 
 
-def _judge_fault(streams: Sequence[Stream], found: Tried, plain: Fit, samples: int) -> JudgedFault:
+def _judge_fault(compared_bases: Sequence[ComparedBase], found: Tried, plain: Fit, samples: int) -> JudgedFault:
     fit, fault, variant, pairs = found
     values = variant.values(fit.sizes)
     apart = _leave_out_blocks(pairs)
@@ -171,7 +173,7 @@ def _judge_fault(streams: Sequence[Stream], found: Tried, plain: Fit, samples: i
         for name in values
     }
     gains = (
-        list(_gains_within_a_set(streams, fault, allowed_sizes(variant), fit.sizes))
+        list(_gains_within_a_set(compared_bases, fault, allowed_sizes(variant), fit.sizes))
         if plain.error > (1 + LEAST_FAULT_GAIN) * fit.error
         else [0.0]
     )
@@ -207,17 +209,17 @@ def _leave_out_blocks(pairs: Sequence[Pair]) -> list[list[Pair]]:
 
 
 def _gains_within_a_set(
-    streams: Sequence[Stream], fault: Fault, variant: Variant, sizes: FloatArray
+    compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant, sizes: FloatArray
 ) -> Iterator[float]:
     """The fault's gains between stretches of one set (negative control): in the clean set from size zero to the
     stretch's own size; in the faulty set from the common size, which is undone everywhere first, because lack of fit of
     the base would gain in any stretch."""
     for clean in (True,) if fault.varies else (True, False):
         common = np.zeros_like(sizes) if clean else sizes
-        sides = [stream.clean if clean else stream.other for stream in streams]
+        sides = [compared.clean if clean else compared.faulty for compared in compared_bases]
         both = [
-            stream.grams(side, rows_with_fault_undone(stream, side, fault, variant))
-            for stream, side in zip(streams, sides, strict=True)
+            compared.grams(side, rows_with_fault_undone(compared, side, fault, variant))
+            for compared, side in zip(compared_bases, sides, strict=True)
         ]
         for at in APART:
             rest = [block for block in ALL if block not in at]

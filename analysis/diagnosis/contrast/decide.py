@@ -65,7 +65,9 @@ def decide(found: Comparison, responses: int) -> Decision:
         *inseparable,
         *_unsure_but_as_good(unsure, best, found)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable), 0)],
     )
-    ahead = [law for law in unsure if law.gain_low > 0 and _behind(law, best) < -_least(best, found)]
+    ahead = [
+        law for law in unsure if law.gain_low > 0 and _excess_error(law, best) < -_least_distinguished(best, found)
+    ]
     same = SAME.get(best.fault.effect, ()) if responses == 1 or best.fault.effect == "force_offset" else ()
     names = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in alike), *same))
                   if name != best.fault.effect)  # fmt: skip
@@ -92,7 +94,9 @@ def _unsure_but_as_good(unsure: Sequence[JudgedFault], best: JudgedFault, found:
     return [
         law
         for law in unsure
-        if law.fault.effect != best.fault.effect and law.gain_low > 0 and abs(_behind(law, best)) <= _least(best, found)
+        if law.fault.effect != best.fault.effect
+        and law.gain_low > 0
+        and abs(_excess_error(law, best)) <= _least_distinguished(best, found)
     ]
 
 
@@ -134,7 +138,10 @@ def _distance_from_none(weighed: JudgedFault, name: str) -> float:
 def _is_inseparable(best: JudgedFault, other: JudgedFault, found: Comparison) -> bool:
     behind = other.errors - best.errors
     drawn = bootstrap_draws(len(behind))
-    return bool(behind.sum() <= _least(best, found) or np.quantile(behind[drawn].sum(axis=1), BOOTSTRAP_LEVEL) <= 0)
+    return bool(
+        behind.sum() <= _least_distinguished(best, found)
+        or np.quantile(behind[drawn].sum(axis=1), BOOTSTRAP_LEVEL) <= 0
+    )
 
 
 def _is_sure_to_leave_less(finer: JudgedFault, best: JudgedFault) -> bool:
@@ -144,12 +151,12 @@ def _is_sure_to_leave_less(finer: JudgedFault, best: JudgedFault) -> bool:
     return bool(np.quantile(ahead[bootstrap_draws(len(ahead))].sum(axis=1), BOOTSTRAP_LEVEL) > 0)
 
 
-def _behind(other: JudgedFault, best: JudgedFault) -> float:
+def _excess_error(other: JudgedFault, best: JudgedFault) -> float:
     """Error of another fault minus that of the best."""
     return float((other.errors - best.errors).sum())
 
 
-def _least(best: JudgedFault, found: Comparison) -> float:
+def _least_distinguished(best: JudgedFault, found: Comparison) -> float:
     """Least difference of a rival's error from that of the best, for it to be distinguished."""
     left = float(best.errors.sum())
     return min(FAULT_RIVAL_BEHIND * (float(found.plain.sum()) - left), FAULT_RIVAL_WORSE * left)

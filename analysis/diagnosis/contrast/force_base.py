@@ -60,11 +60,11 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
     scales = [scales_of(motions, channel, rotational) for channel in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
     regression = regression_of(motions, axis, list(laws_of(motions, rotational)), turns)
-    left = regression.remainder(regression.columns_of(_select_laws(regression)))
+    residuals = regression.remainder(regression.columns_of(_select_laws(regression)))
     more = [
         cogging_law(channel, pitch, scale)
         for channel, scale in enumerate(scales)
-        for pitch in likely_pitches(motions, left, channel, scale)
+        for pitch in likely_pitches(motions, residuals, channel, scale)
     ]
     if more:
         regression = regression_of(motions, axis, (*regression.laws, *more), turns)
@@ -81,15 +81,15 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
 def _select_laws(regression: Regression) -> tuple[int, ...]:
     """Forward selection of laws, as long as the cross-validated error falls by `BASE_LAW_GAIN`."""
     laws: tuple[int, ...] = ()
-    left = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
+    error = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
     while len(laws) < MOST_BASE_LAWS:
         tried = [
             (float(regression.cross_validated_errors(regression.columns_of((*laws, number))).sum()), number)
             for number in range(len(regression.laws))
             if number not in laws
         ]
-        if not tried or min(tried)[0] > (1 - BASE_LAW_GAIN) * left:
+        if not tried or min(tried)[0] > (1 - BASE_LAW_GAIN) * error:
             break
-        left, best = min(tried)
+        error, best = min(tried)
         laws = (*laws, best)
     return laws

@@ -70,7 +70,7 @@ class Grams:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Blocks of one stream: those in which a fault is undone, and those without it."""
+    """Blocks of one compared: those in which a fault is undone, and those without it."""
 
     with_it: Grams
     at: tuple[int, ...]
@@ -97,7 +97,7 @@ class Fit:
 
     sizes: FloatArray
     errors: FloatArray
-    """(blocks with, then without): white sums of squares, over all streams."""
+    """(blocks with, then without): white sums of squares, over all compared_bases."""
 
     @property
     def error(self) -> float:
@@ -109,13 +109,13 @@ def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
     sizes = np.zeros(0) if variant is None else _starting_sizes(variant)
     for _ in range(0 if variant is None else ROUNDS):
         assert variant is not None
-        pulls, grams = np.zeros(len(sizes)), np.zeros((len(sizes), len(sizes)))
+        gradients, grams = np.zeros(len(sizes)), np.zeros((len(sizes), len(sizes)))
         for pair in pairs:
-            pull, gram = _newton_terms(pair, sizes)
-            pulls += pull
+            gradient, gram = _newton_terms(pair, sizes)
+            gradients += gradient
             grams += gram
         grams += 1e-9 * max(float(np.trace(grams)) / len(grams), 1e-300) * np.eye(len(grams))
-        moved = np.clip(sizes - np.linalg.solve(grams, pulls), variant.least, variant.most)
+        moved = np.clip(sizes - np.linalg.solve(grams, gradients), variant.least, variant.most)
         if np.allclose(moved, sizes, rtol=1e-6, atol=1e-12):
             sizes = moved
             break
@@ -135,8 +135,8 @@ def _starting_sizes(variant: Variant) -> FloatArray:
 
 def weights_of(plain: FloatArray) -> FloatArray:
     """(width,): 1, then minus the least-squares weights of the other columns: rows times it are residuals."""
-    gram, pull = plain[1:, 1:], plain[1:, 0]
-    found = np.linalg.solve(_add_ridge(gram), pull)
+    gram, cross = plain[1:, 1:], plain[1:, 0]
+    found = np.linalg.solve(_add_ridge(gram), cross)
     return np.concatenate([[1.0], -found])
 
 

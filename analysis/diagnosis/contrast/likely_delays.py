@@ -11,58 +11,60 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
+from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, apply_filter
 from analysis.diagnosis.contrast.fault import ClockRate
 from analysis.diagnosis.contrast.joint_products import weights_of
 from analysis.diagnosis.contrast.sensor_base import SensorBase
-from analysis.diagnosis.contrast.stream import REACH, Stream, apply_filter
 from analysis.diagnosis.settings import CLOCK_FASTEST, CONTRAST_BLOCKS, LATE_STEP
 from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 
-def likely_delays_s(streams: Sequence[Stream]) -> tuple[float, ...]:
+def likely_delays_s(compared_bases: Sequence[ComparedBase]) -> tuple[float, ...]:
     """Delays of the faulty responses behind the commands: per base of the device, the delay by cross-correlation, if it
     is at least one row, and delays up to half a row away from it."""
     found = []
-    for stream in _of_device(streams):
-        late = _rows_late(stream)
-        found += [float(late + by) * stream.row_s for by in _around() if late]
+    for compared in _of_device(compared_bases):
+        late = _rows_late(compared)
+        found += [float(late + by) * compared.row_s for by in _offsets_around() if late]
     return tuple(dict.fromkeys(found))
 
 
-def likely_clock_rates(streams: Sequence[Stream]) -> tuple[ClockRate, ...]:
+def likely_clock_rates(compared_bases: Sequence[ComparedBase]) -> tuple[ClockRate, ...]:
     """Clock rates at which the delay grows over the faulty set: per base of the device, the most likely one, if it
     amounts to at least a row at the end, and those within half a row there."""
     found = []
-    for stream in _of_device(streams):
-        for runs_on in (True, False) if any(part.start > 0 for part in stream.other.parts) else (True,):
-            rate, end = _likeliest_rate(stream, runs_on)
+    for compared in _of_device(compared_bases):
+        for runs_on in (True, False) if any(part.start > 0 for part in compared.faulty.parts) else (True,):
+            rate, end = _likeliest_rate(compared, runs_on)
             if abs(rate) * end >= 1:
-                found += [ClockRate(rate + by / end, LATE_STEP / end, runs_on) for by in _around()]
+                found += [ClockRate(rate + by / end, LATE_STEP / end, runs_on) for by in _offsets_around()]
     return tuple(found)
 
 
-def _around() -> list[float]:
+def _offsets_around() -> list[float]:
     """Offsets in rows from a likely delay to those that are tried."""
     return [float(by) for by in np.arange(-0.5, 0.51, LATE_STEP)]
 
 
-def _of_device(streams: Sequence[Stream]) -> list[Stream]:
-    return [stream for stream in streams if not isinstance(stream.base, SensorBase)]
+def _of_device(compared_bases: Sequence[ComparedBase]) -> list[ComparedBase]:
+    return [compared for compared in compared_bases if not isinstance(compared.base, SensorBase)]
 
 
-def _made_by(stream: Stream, rows: FloatArray) -> FloatArray:
+def _made_by(compared: ComparedBase, rows: FloatArray) -> FloatArray:
     """(n, 2): whitened errors of the clean set's base, split into the contributions of responses and of commands."""
-    weights = weights_of(stream.clean.white.T @ stream.clean.white) / stream.columns
+    weights = weights_of(compared.clean.white.T @ compared.clean.white) / compared.columns
     pushed = np.arange(len(weights)) == 0
-    if isinstance(stream.base, AutoregressiveBase):
-        pushed = stream.base.command_columns(len(weights))
-    return apply_filter(stream.whitening, rows @ np.column_stack([weights * ~pushed, -weights * pushed]))[REACH:-REACH]
+    if isinstance(compared.base, AutoregressiveBase):
+        pushed = compared.base.command_columns(len(weights))
+    return apply_filter(compared.whitening, rows @ np.column_stack([weights * ~pushed, -weights * pushed]))[
+        REACH:-REACH
+    ]
 
 
-def _rows_late(stream: Stream) -> float:
+def _rows_late(compared: ComparedBase) -> float:
     """Rows by which the responses lag the commands in the longest part of the faulty set; 0 for less than one."""
-    made = _made_by(stream, max(stream.other.rows, key=len))
+    made = _made_by(compared, max(compared.faulty.rows, key=len))
     longest = len(made) // 4
     if longest < 1:
         return 0.0
@@ -70,10 +72,10 @@ def _rows_late(stream: Stream) -> float:
     return late if 1 <= late < longest else 0.0
 
 
-def _likeliest_rate(stream: Stream, runs_on: bool) -> tuple[float, float]:
+def _likeliest_rate(compared: ComparedBase, runs_on: bool) -> tuple[float, float]:
     """The relative clock rate along whose delays the cross-correlations of short blocks have the largest sum (a Radon
     transform of their peaks), and the last block's time, in rows. 0 where that is the fastest of all."""
-    times, correlations = _correlate_blocks(stream, runs_on)
+    times, correlations = _correlate_blocks(compared, runs_on)
     if not correlations.size:
         return 0.0, 0.0
     end, longest = float(times.max()), correlations.shape[1] // 2
@@ -87,17 +89,21 @@ def _likeliest_rate(stream: Stream, runs_on: bool) -> tuple[float, float]:
     return (float(rates[best]) if 0 < best < len(rates) - 1 else 0.0), end
 
 
-def _correlate_blocks(stream: Stream, runs_on: bool) -> tuple[FloatArray, FloatArray]:
+def _correlate_blocks(compared: ComparedBase, runs_on: bool) -> tuple[FloatArray, FloatArray]:
     """Times of blocks (b,) in rows, and per block the correlation coefficients at each lag (b, 2 longest + 1) of what
     its responses make with what all commands of its part make. Empty where all parts are too short."""
-    before = stream.base.order if isinstance(stream.base, AutoregressiveBase) else 0
-    starts = [before + (part.start / (part.rate_hz * stream.row_s) if runs_on else 0.0) for part in stream.other.parts]
-    whole = sum(len(rows) for rows in stream.other.rows)
-    longest = int(CLOCK_FASTEST * max(start + len(rows) for start, rows in zip(starts, stream.other.rows, strict=True)))
+    before = compared.base.order if isinstance(compared.base, AutoregressiveBase) else 0
+    starts = [
+        before + (part.start / (part.rate_hz * compared.row_s) if runs_on else 0.0) for part in compared.faulty.parts
+    ]
+    whole = sum(len(rows) for rows in compared.faulty.rows)
+    longest = int(
+        CLOCK_FASTEST * max(start + len(rows) for start, rows in zip(starts, compared.faulty.rows, strict=True))
+    )
     times: list[float] = []
     found: list[FloatArray] = []
-    for start, rows in zip(starts, stream.other.rows, strict=True):
-        made = _made_by(stream, rows)
+    for start, rows in zip(starts, compared.faulty.rows, strict=True):
+        made = _made_by(compared, rows)
         if len(made) < CONTRAST_BLOCKS or longest < 1:
             continue
         room = next_fast_len(len(made) + longest, True)

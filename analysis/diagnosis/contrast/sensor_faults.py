@@ -32,7 +32,7 @@ from equalizer.effects.simulation.bristle_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Read = Callable[[FloatArray, float], FloatArray]
-"""From the readings of one channel (n,) at a rate to those without the fault."""
+"""Function that removes a fault: readings of one channel (n,) and their rate (Hz) to readings without the fault."""
 WIDELY = (0.5, 1.6)
 """Range of sizes, as `AROUND`, for faults that act nearly in proportion to their size."""
 GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
@@ -80,7 +80,7 @@ def sensor_faults(number: int, name: str, parts: Sequence[Part], rows: Rows) -> 
     shares = [side * share for share in BENT for side in (1.0, -1.0)]
     yield channel.fault("sensor_nonlinearity", [_nonlinearity(channel, share, 3, "cubic") for share in shares])
     yield channel.fault("sensor_asymmetry", [_nonlinearity(channel, share, 2, "square") for share in shares])
-    yield channel.fault("sensor_play", [_play(channel, share * channel.rms) for share in PLAYS])
+    yield channel.fault("sensor_play", [_backlash(channel, share * channel.rms) for share in PLAYS])
     for other in range(longest.response.shape[1]):
         if other != number:
             yield _cross_axis_sensitivity(channel, other)
@@ -123,7 +123,7 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray
     yield replace(channel.fault("clock_drift", clocks), varies=True)
 
 
-def _play(channel: _Channel, gap: float) -> Variant:
+def _backlash(channel: _Channel, gap: float) -> Variant:
     return Variant((channel.of(lambda y, rate: _undo_play(y, gap)),), proportional_number("gap", gap), *WIDELY)
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from analysis.diagnosis.contrast.compared_base import ComparedBase, rows_with_fault_undone
 from analysis.diagnosis.contrast.fault import Fault, Variant, fix_size
 from analysis.diagnosis.contrast.joint_products import Fit, Pair, fit_sizes
-from analysis.diagnosis.contrast.stream import Stream, rows_with_fault_undone
 from analysis.diagnosis.settings import CONTRAST_BLOCKS, SIZE_IS_NEAR, UNDOING_ROUNDS
 from analysis.diagnosis.types import TimeBudget
 
@@ -29,32 +29,37 @@ class Trial:
     """Whether all faults were tried before the time ran out."""
 
 
-def try_faults(streams: Sequence[Stream], faults: Sequence[Fault], time_left: TimeBudget) -> Trial:
-    """Tries every fault on all streams, in order, until the time runs out."""
-    clean = [stream.grams(stream.clean, []).blocks for stream in streams]
+def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], time_left: TimeBudget) -> Trial:
+    """Tries every fault on all compared_bases, in order, until the time runs out."""
+    clean = [compared.grams(compared.clean, []).blocks for compared in compared_bases]
     bare = [
-        Pair(stream.grams(stream.other, []), ALL, tuple(own), (stream.clean.scale / stream.other.scale) ** 2)
-        for stream, own in zip(streams, clean, strict=True)
+        Pair(compared.grams(compared.faulty, []), ALL, tuple(own), (compared.clean.scale / compared.faulty.scale) ** 2)
+        for compared, own in zip(compared_bases, clean, strict=True)
     ]
     best: list[Tried] = []
     complete = False
     for fault in faults:
         if not time_left():
             break
-        tried = [found for variant in fault.variants if (found := _try_variant(bare, streams, fault, variant))]
+        tried = [found for variant in fault.variants if (found := _try_variant(bare, compared_bases, fault, variant))]
         if tried:
-            best.append(_best_of(tried, bare, streams))
+            best.append(_best_of(tried, bare, compared_bases))
     else:
         complete = True
     return Trial(bare, sorted(best, key=_error_of), complete)
 
 
-def _try_variant(bare: Sequence[Pair], streams: Sequence[Stream], fault: Fault, variant: Variant) -> Tried | None:
+def _try_variant(
+    bare: Sequence[Pair], compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant
+) -> Tried | None:
     """Undo the fault by this variant and measure what error remains; None where undoing it is ill-conditioned. bare:
     the pairs with nothing undone."""
     pairs = [
-        replace(pair, with_it=stream.grams(stream.other, rows_with_fault_undone(stream, stream.other, fault, variant)))
-        for stream, pair in zip(streams, bare, strict=True)
+        replace(
+            pair,
+            with_it=compared.grams(compared.faulty, rows_with_fault_undone(compared, compared.faulty, fault, variant)),
+        )
+        for compared, pair in zip(compared_bases, bare, strict=True)
     ]
     well_conditioned = all(pair.with_it.is_well_conditioned(variant) for pair in pairs)
     return (fit_sizes(pairs, variant), fault, variant, pairs) if well_conditioned else None
@@ -64,24 +69,24 @@ def _error_of(tried: Tried) -> float:
     return tried[0].error
 
 
-def _best_of(tried: Sequence[Tried], bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
+def _best_of(tried: Sequence[Tried], bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]) -> Tried:
     """The variant with the smallest error, after linearisation about its size. Of faults that are valid at size 1 only,
     several are kept, because at another size any of them may have a smaller error than the true one."""
     first = min(tried, key=_error_of)
     if not first[2].exact:
-        return _approach(first, bare, streams)
+        return _approach(first, bare, compared_bases)
     at_size_1 = sorted(tried, key=lambda each: _error_of(_at_allowed_size(each)))[:VARIANTS_APPROACHED]
-    return min((_approach(each, bare, streams) for each in (first, *at_size_1)), key=_error_of)
+    return min((_approach(each, bare, compared_bases) for each in (first, *at_size_1)), key=_error_of)
 
 
-def _approach(found: Tried, bare: Sequence[Pair], streams: Sequence[Stream]) -> Tried:
+def _approach(found: Tried, bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]) -> Tried:
     """The fault linearised repeatedly about the size that was found: far from it, the change is only extrapolated."""
     best = _at_allowed_size(found)
     for _ in range(UNDOING_ROUNDS):
         fit, fault, variant, _ = found
         if variant.about is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
             break
-        again = _try_variant(bare, streams, fault, variant.about(float(fit.sizes[0])))
+        again = _try_variant(bare, compared_bases, fault, variant.about(float(fit.sizes[0])))
         if again is None:
             break
         found, before = again, best

@@ -7,7 +7,7 @@ from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 
 PAST = 6
-"""Past samples of each signal from which the command is predicted."""
+"""Number of past samples of each signal from which the command is predicted (Granger causality)."""
 _LEAST = 200
 """Fewest known samples for the test."""
 

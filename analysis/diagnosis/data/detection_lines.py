@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.types import Mask
-from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import ComplexArray
 
 _SILENT = 3e-3
 """Largest amplitude of a silent line, relative to the strongest line of its input."""
@@ -37,8 +37,9 @@ class DetectionLines:
 
 
 def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines | None:
-    """excitation: (lines, inputs), line k in row k - 1. held: samples for which each value of the command is held;
-    above half of the command's own rate there are only images. None where nothing is driven."""
+    """Driven lines of a periodic excitation, and silent ones on which distortion shows. excitation: (lines, inputs),
+    line k in row k - 1. held: samples for which each value of the command is held; above half of the command's own rate
+    there are only images. None where nothing is driven."""
     size = np.abs(excitation)
     size[(len(size) + 1) // held :] = 0
     strongest = size.max()

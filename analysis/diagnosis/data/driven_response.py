@@ -12,9 +12,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from analysis.diagnosis.settings import ANSWER_COHERENCE, ANSWER_DEVIATIONS
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import hann
 
 STRETCHES = 12
@@ -70,9 +69,9 @@ def _predicts(y: FloatArray, signals: FloatArray, ahead: bool) -> bool:
     gram = rows[first].T @ rows[first]
     weights = np.linalg.solve(gram + RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), rows[first].T @ y[first])
     last = kept & ~first
-    left = np.sum((y[last] - rows[last] @ weights) ** 2, axis=0)
+    residual_squares = np.sum((y[last] - rows[last] @ weights) ** 2, axis=0)
     power = np.maximum(np.sum((y[last] - y[first].mean(axis=0)) ** 2, axis=0), 1e-300)
-    return bool(np.any(left < (1 - ANSWER_COHERENCE) * power))
+    return bool(np.any(residual_squares < (1 - ANSWER_COHERENCE) * power))
 
 
 def _spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArray]:

@@ -37,18 +37,18 @@ def find_segments(recording: Recording) -> tuple[Recording, str]:
     if recording.segments:
         return recording, ""
     parts = parts_of(recording)
-    decided = decided_command(recording).samples
+    decided = designed_command(recording).samples
     periods = [exact_period(decided[start:stop]) for start, stop in parts]
     if not any(periods):
         return recording, ""
     segments = tuple(
-        Segment(start, stop, _kind(decided[start:stop], period), _peak(recording.command, start, stop), period)
+        Segment(start, stop, _segment_kind(decided[start:stop], period), _peak(recording.command, start, stop), period)
         for (start, stop), period in zip(parts, periods, strict=True)
     )
     return replace(recording, segments=segments), _segments_sentence(segments)
 
 
-def decided_command(recording: Recording) -> Signal:
+def designed_command(recording: Recording) -> Signal:
     """The signal that was designed beforehand: the excitation where one was recorded and varies, else the command."""
     excitation = recording.excitation
     if excitation is None:
@@ -123,7 +123,7 @@ def _is_same(later: FloatArray, before: FloatArray) -> bool:
     return True
 
 
-def _kind(command: FloatArray, period: int) -> str:
+def _segment_kind(command: FloatArray, period: int) -> str:
     if not period:
         return "noise"
     power = np.sum(np.abs(np.fft.rfft(command[:period] - command[:period].mean(axis=0), axis=0)) ** 2, axis=1)

@@ -4,7 +4,7 @@ import numpy as np
 
 from analysis.diagnosis.settings import MOST_GROWTH
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import ComplexArray
 
 
 def growth_rate(model: MechanicalModel) -> float:

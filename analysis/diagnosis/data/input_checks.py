@@ -42,8 +42,8 @@ def require_alike(
     for other, name in zip(recordings[1:], names[1:], strict=True):
         for what, expected, two in (
             ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{other.sample_rate_hz:g} Hz"),
-            ("command", _words(first.command), _words(other.command)),
-            ("response", _words(first.response), _words(other.response)),
+            ("command", _quantities_text(first.command), _quantities_text(other.command)),
+            ("response", _quantities_text(first.response), _quantities_text(other.response)),
         ):
             if expected != two:
                 problems.append(f"{name} has the {what} {two}, {names[0]} has {expected}; {what_now}")
@@ -214,7 +214,7 @@ def _unlike_quantities(model: MechanicalModel, recording: Recording) -> Iterator
     if turning is not None and turning != model.rotational:
         kinds = ("translational (kg, N, m)", "rotational (kg m^2, N m, rad)")
         own, its = kinds[model.rotational], kinds[turning]
-        yield f"the model is {own}, but the recording is {its}: {_words(recording.response)}"
+        yield f"the model is {own}, but the recording is {its}: {_quantities_text(recording.response)}"
 
 
 def _is_rotational(recording: Recording) -> bool | None:
@@ -277,5 +277,5 @@ def _misplaced_effects(model: MechanicalModel, recording: Recording) -> Iterator
         yield str(problem)
 
 
-def _words(signal: Signal) -> str:
+def _quantities_text(signal: Signal) -> str:
     return ", ".join(f"{name} ({unit})" for name, unit in zip(signal.channels, signal.units, strict=True))

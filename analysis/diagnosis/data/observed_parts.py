@@ -89,15 +89,15 @@ def part_of(recording: Recording, start: int, stop: int) -> Recording:
         recording,
         command=recording.command.part(start, stop),
         response=recording.response.part(start, stop),
-        position=_part(recording.position, start, stop),
-        excitation=_part(recording.excitation, start, stop),
-        condition=_part(recording.condition, start, stop),
+        position=_cut_signal(recording.position, start, stop),
+        excitation=_cut_signal(recording.excitation, start, stop),
+        condition=_cut_signal(recording.condition, start, stop),
         time_s=None if recording.time_s is None else recording.time_s[start:stop],
         segments=tuple(segments),
     )
 
 
-def _part(signal: Signal | None, start: int, stop: int) -> Signal | None:
+def _cut_signal(signal: Signal | None, start: int, stop: int) -> Signal | None:
     return None if signal is None else signal.part(start, stop)
 
 

@@ -28,7 +28,7 @@ def add_mass(model: MechanicalModel, added: float) -> MechanicalModel:
     return replace(model, mass=model.mass + added * axes @ axes.T)
 
 
-def under_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> tuple[PlacedEffect, ...]:
+def effects_under_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> tuple[PlacedEffect, ...]:
     """The effects with the recording's conditions, for those that depend on conditions; missing samples of these are
     interpolated. Without recorded conditions such effects are not changed, and cannot be simulated."""
     signal = recording.condition

@@ -8,7 +8,8 @@ with linear factors w_j and nonlinear parameters a_j (exponents, widths, time co
    caused: with H the model's transfer function from that force, in units of the noise, b = H* r / |H|. Noise stays
    white, and a column of terms costs two Fourier transforms instead of a simulation.
 3. `screen_terms` regresses b on each term beside the columns of the model's own parameters, by blocks: a block's error
-   is that of weights fitted to all others (cross-validation). `beam` extends the best terms to sums; `fit_sum` fits the
+   is that of weights fitted to all others (cross-validation). `beam` extends the best terms to sums,
+   ranked by the Bayesian information criterion (squared error plus log n for each parameter); `fit_sum` fits the
    nonlinear parameters. A time-shuffled b gives the gain that chance has: the negative control.
 4. `discover` fits the best sums by output error (`fit_laws`), adds the best one, and repeats; `antisymmetric_pairs`
    joins forces of two axes on each other; `snap_exponents` replaces fitted exponents by whole or half numbers where the

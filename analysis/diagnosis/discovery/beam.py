@@ -21,7 +21,9 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 _PLACEBOS = 3
+"""Shuffles of the blocks in the negative control."""
 _LACKING = 2
+"""Sums that are fitted to what the best sum leaves."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

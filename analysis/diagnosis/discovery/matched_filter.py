@@ -26,10 +26,10 @@ from equalizer.laws.law import ActsOn
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.band_limited import low_pass_gain
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SETTLING_S = 2.0
+"""Zero padding for the filter's transient (s)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

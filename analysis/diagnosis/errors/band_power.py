@@ -53,7 +53,7 @@ class BandPower:
             for number, record in enumerate(self.measure.records)
             for first, last in self._spans(number)
             for part in PARTS
-            for first, last in _inside(getattr(record, part), first, last)
+            for first, last in _longest_run(getattr(record, part), first, last)
         )
 
     @cached_property
@@ -105,7 +105,7 @@ class BandPower:
         return segments or [(first, min(first + longest, length)) for first in range(0, length, longest)]
 
 
-def _inside(mask: Mask, first: int, last: int) -> list[tuple[int, int]]:
+def _longest_run(mask: Mask, first: int, last: int) -> list[tuple[int, int]]:
     """The longest run of samples that count, between first and last; empty where it is short."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[first:last].astype(np.int8), [0]]))).reshape(-1, 2)
     runs = [(first + int(a), first + int(b)) for a, b in edges if b - a >= LEAST]

@@ -151,15 +151,15 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
     columns[~np.isfinite(columns).all(axis=1)] = 0.0
     trust = np.minimum(1.0, TRUSTED / np.maximum(np.abs(off), TRUSTED))
     # Steps of the model's own numbers are small; where they leave a large residual, an effect is missing.
-    believed = columns * (trust**3 if t else trust)
-    pull = believed @ off
-    products = believed @ columns.T
+    weighted = columns * (trust**3 if t else trust)
+    rhs = weighted @ off
+    products = weighted @ columns.T
     if t:
-        pull[:t] -= at.deviations
+        rhs[:t] -= at.deviations
         products[:t, :t] += np.eye(t)
     products += 1e-9 * np.diag(np.maximum(np.diagonal(products), 1e-9))
     low, high = _step_bounds(at, t)
-    step = bounded_step(products, pull, low, high)
+    step = bounded_step(products, rhs, low, high)
     there = at
     for share in SHARES:
         deviations = at.deviations + share * step[:t] if t else at.deviations

@@ -13,8 +13,6 @@ from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import UNTIMED, Choice, choose_measure, samples_to_settle
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.windows import windows_of
-from analysis.diagnosis.forces.force_views import force_views
 from analysis.diagnosis.noise.noise_floor import NoiseFloor, noise_floor
 from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.diagnosis.settings import UNKNOWN_NOISE_SHARE
@@ -25,7 +23,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 Compared = Literal["auto", "motion", "force"]
-"""What a user asks to be compared; auto: selected by the rule."""
+"""Signals that the user asks to be compared; auto: selected by the rule."""
 
 DITHER = 0.02
 """Noise in steps of a converter below which differences between repeats do not show the noise."""
@@ -80,6 +78,9 @@ def measure_of(
     if choice.measure == "free simulation":
         return Chosen(FreeSimulation(records, unit, noise, known=known), floors, remarks)
     if choice.measure == "windows":
+        # Imported here, as in `_by_force`: most diagnoses compare a free simulation.
+        from analysis.diagnosis.errors.windows import windows_of
+
         try:
             windows = replace(windows_of(records, model, (unit, noise)), known=known)
             return Chosen(windows, floors, remarks)
@@ -105,6 +106,8 @@ def _by_force(
     remarks: tuple[str, ...],
     band_hz: float | None = None,
 ) -> Chosen:
+    from analysis.diagnosis.forces.force_views import force_views
+
     known = place_recorded_effects(model, records[0].recording)
     views = force_views(records, model, floors, band_hz)
     text = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."

@@ -28,11 +28,12 @@ from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.growth_rate import free_motion_rates, is_unstable_within
 from analysis.diagnosis.data.measured_motion import has_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.windows import WINDOW_S
 from analysis.diagnosis.settings import DIES_OUT_SHARE, MOST_LEFT_OUT, REST_S, REST_SHARE, SETTLED_CONSTANTS
 from equalizer.plant.mechanical_model import MechanicalModel
 
 Measure = Literal["free simulation", "windows", "predicted force"]
+WINDOW_S = 1.0
+"""Shortest window (s)."""
 UNTIMED = (
     "No time is known: forces are compared as they stand beside the positions, sample by sample; nothing that hangs on "
     "speed, acceleration or frequency is known."

@@ -16,7 +16,7 @@ EXPECTED = 0.1
 def evidence_of(
     model: MechanicalModel,
     record: Observed,
-    played: SimulationResult,
+    simulated: SimulationResult,
     left: FloatArray,
     scales: tuple[FloatArray, FloatArray],
 ) -> Evidence:
@@ -27,14 +27,14 @@ def evidence_of(
     rate_hz, p = record.recording.sample_rate_hz, model.outputs
     expected = EXPECTED * np.maximum(np.sqrt(np.mean(record.command**2, axis=0)), 1e-12)
     missing = missing_force(model, residuals, unit, rate_hz, expected)
-    measured, predicted = without_gaps(record.measured, left * unit, played)
+    measured, predicted = without_gaps(record.measured, left * unit, simulated)
     has_position = measured.shape[1] > p
     return Evidence(
         model=model,
         sample_rate_hz=rate_hz,
         command=record.command,
-        axis_position=played.axis_position + missing.position,
-        axis_velocity=played.axis_velocity + missing.velocity,
+        axis_position=simulated.axis_position + missing.position,
+        axis_velocity=simulated.axis_velocity + missing.velocity,
         axis_force=missing.force,
         response=measured[:, :p],
         predicted=predicted[:, :p],
@@ -47,11 +47,11 @@ def evidence_of(
 
 
 def without_gaps(
-    measured: FloatArray, residuals: FloatArray, played: SimulationResult
+    measured: FloatArray, residuals: FloatArray, simulated: SimulationResult
 ) -> tuple[FloatArray, FloatArray]:
     """Measured and predicted signals, (n, c) each, without gaps: missing samples are replaced by the simulation in
     both, so that their difference is zero."""
     known = np.isfinite(measured)
-    simulated = np.hstack([played.response, played.position])[:, : measured.shape[1]]
-    predicted = np.where(known, measured - residuals, simulated)
+    predicted = np.hstack([simulated.response, simulated.position])[:, : measured.shape[1]]
+    predicted = np.where(known, measured - residuals, predicted)
     return np.where(known, measured, predicted), predicted

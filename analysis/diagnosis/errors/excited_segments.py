@@ -18,7 +18,7 @@ LONGEST_S = 6.0
 def select_excited_segments(measure: FreeSimulation, axis: int) -> FreeSimulation:
     """The measure on the segments that excite an axis, each from rest; unchanged where there are none."""
     parts = tuple(
-        _cut(record, segment)
+        _cut_record(record, segment)
         for record in measure.records
         for segment in record.recording.segments
         if segment.kind != "rest" and segment.stop <= len(record.command) and _is_excited(record, segment, axis)
@@ -32,7 +32,7 @@ def _is_excited(record: Observed, segment: Segment, axis: int) -> bool:
     return bool(power[axis] >= EXCITED_SHARE**2 * power.max() > 0)
 
 
-def _cut(record: Observed, segment: Segment) -> Observed:
+def _cut_record(record: Observed, segment: Segment) -> Observed:
     longest = int(LONGEST_S * record.recording.sample_rate_hz)
     if segment.period:
         longest = max(longest // segment.period, 1) * segment.period

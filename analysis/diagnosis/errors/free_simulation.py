@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.errors.evidence_from_residuals import evidence_of
 from equalizer.effects.effect import AxisForce, Effect, JointForce, PlacedEffect
 from equalizer.effects.simulation.bodies import Restarts
@@ -31,14 +31,16 @@ class FreeSimulation:
 
     records: tuple[Observed, ...]
     unit: FloatArray
+    """(c,): unit of the residuals: the rms noise, with the floor of `with_floor` added."""
     noise: FloatArray
     """(c,): rms noise."""
     name: str = "free simulation"
     known: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
+    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
     coarser: int = 1
-    """Factor on the length of steps under motion-dependent forces."""
+    """Factor on the length of time steps under motion-dependent forces."""
     pieces: tuple[Restarts, ...] = ()
     """Per record, where its parts were joined, and the states in which these begin; empty where records are whole."""
 
@@ -56,7 +58,7 @@ class FreeSimulation:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
+        with np.errstate(over="ignore", invalid="ignore"):  # a simulation may diverge
             return tuple(
                 _subtract_prediction(record.measured, self._simulate(model, effects, record, simulate_response, joined))
                 / self.unit
@@ -68,7 +70,7 @@ class FreeSimulation:
     ) -> FloatArray:
         """States of the simulation just before given samples of a record: positions and velocities (k, 2n)."""
         signals = record.recording
-        every = under_conditions((*self.known, *effects), signals)
+        every = effects_under_conditions((*self.known, *effects), signals)
         model = add_carried_weight(model, signals)
         return states_before(model, record.command, (signals.sample_rate_hz, signals.hold), every, at)
 
@@ -84,7 +86,9 @@ class FreeSimulation:
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
         model = add_carried_weight(model, signals)
-        every = [_coarsen(placed, self.coarser) for placed in under_conditions((*self.known, *effects), signals)]
+        every = [
+            _coarsen(placed, self.coarser) for placed in effects_under_conditions((*self.known, *effects), signals)
+        ]
         if joined is not None:
             sampled = signals.sample_rate_hz, signals.hold
             return simulate_windows(model, record.command, sampled, every, measurement, joined)
@@ -95,13 +99,14 @@ class FreeSimulation:
     ) -> tuple[Evidence, ...]:
         found = []
         for record, left in zip(self.records, residuals, strict=True):
-            played = self._simulate(model, effects, record, simulate_mechanism)
-            there = add_carried_weight(model, record.recording)
-            found.append(evidence_of(there, record, played, left, (self.unit, self.noise)))
+            simulated = self._simulate(model, effects, record, simulate_mechanism)
+            loaded = add_carried_weight(model, record.recording)
+            found.append(evidence_of(loaded, record, simulated, left, (self.unit, self.noise)))
         return tuple(found)
 
 
 def _coarsen(placed: PlacedEffect, times: int) -> PlacedEffect:
+    """The effect with `times` times longer time steps."""
     acts = placed.effect.acts
     if times == 1 or not isinstance(acts, (AxisForce, JointForce)):
         return placed
@@ -109,14 +114,14 @@ def _coarsen(placed: PlacedEffect, times: int) -> PlacedEffect:
     return replace(placed, effect=replace(placed.effect, acts=longer))
 
 
-def _subtract_prediction(measured: FloatArray, played: SimulationResult) -> FloatArray:
+def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> FloatArray:
     """The residual: measured less simulated signals."""
-    p, rest = played.response.shape[1], measured.copy()
-    rest[:, :p] -= played.response
-    rest[:, p:] -= played.position[:, : rest.shape[1] - p]
+    p, rest = simulated.response.shape[1], measured.copy()
+    rest[:, :p] -= simulated.response
+    rest[:, p:] -= simulated.position[:, : rest.shape[1] - p]
     return rest
 
 
-def predicted_channels(played: SimulationResult, count: int) -> FloatArray:
+def predicted_channels(simulated: SimulationResult, count: int) -> FloatArray:
     """(n, count): the response and, where `count` includes it, the position."""
-    return np.hstack([played.response, played.position])[:, :count]
+    return np.hstack([simulated.response, simulated.position])[:, :count]

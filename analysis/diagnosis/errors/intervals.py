@@ -116,9 +116,9 @@ def finish_fit(
 
 def _normal_equations(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> tuple[FloatArray, FloatArray]:
     """Normal matrix and right side of a Gauss-Newton step in all numbers, with the calibration as observations."""
-    pull, t = known.on(residuals_to_fit(measure, fitted.residuals)), len(fitted.deviations)
-    pull[:t] -= fitted.deviations
-    return _with_calibration(known.squares, t), pull
+    rhs, t = known.on(residuals_to_fit(measure, fitted.residuals)), len(fitted.deviations)
+    rhs[:t] -= fitted.deviations
+    return _with_calibration(known.squares, t), rhs
 
 
 def _with_calibration(squares: FloatArray, t: int) -> FloatArray:
@@ -143,19 +143,19 @@ def standard_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -
 def segment_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray | None:
     """(t + numbers,): jackknife standard errors over segments; None where there is one segment. known: as above."""
     errors = residuals_to_fit(measure, fitted.residuals)
-    products, pulls = [], []
+    products, scores = [], []
     for begin, end in _segments(measure):
         moves = known.over(begin, end)
         products.append(moves @ moves.T)
-        pulls.append(moves @ errors[begin:end])
+        scores.append(moves @ errors[begin:end])
     if len(products) < 2:
         return None
     whole = _with_calibration(np.sum(products, axis=0), len(fitted.deviations))
     scale = np.sqrt(np.maximum(np.diagonal(whole), np.finfo(float).tiny))
     left_out = []
-    for part, pull in zip(products, pulls, strict=True):
+    for part, rhs in zip(products, scores, strict=True):
         rest = (whole - part) / np.outer(scale, scale)
-        left_out.append(np.linalg.pinv(rest, rcond=1e-12, hermitian=True) @ (pull / scale) / scale)
+        left_out.append(np.linalg.pinv(rest, rcond=1e-12, hermitian=True) @ (rhs / scale) / scale)
     moved, count = np.array(left_out), len(left_out)
     return np.asarray(np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)))
 

@@ -186,11 +186,11 @@ def _gauss_newton_step(
     with np.errstate(over="ignore", invalid="ignore"):
         cross = known.on(own)
         products = np.block([[known.squares + np.eye(t), cross], [cross.T, own @ own.T]])
-        pull = np.concatenate([known.on(errors) - from_.deviations, own @ errors])
-    if not (np.isfinite(products).all() and np.isfinite(pull).all()):
+        rhs = np.concatenate([known.on(errors) - from_.deviations, own @ errors])
+    if not (np.isfinite(products).all() and np.isfinite(rhs).all()):
         # A parameter made the simulation diverge.
         return None
-    return take_step(measure, tuning, from_, (products, pull))
+    return take_step(measure, tuning, from_, (products, rhs))
 
 
 def take_step(
@@ -226,11 +226,11 @@ def _first_better(
 ) -> tuple[Fitted | None, bool]:
     """The fit after the first of ever shorter steps that lowers the cost, None where none does; and whether any step
     led to an invalid mechanical model. system: normal matrix and right side."""
-    (products, pull), t, impossible = system, len(from_.deviations), False
+    (products, rhs), t, impossible = system, len(from_.deviations), False
     # Steps that make the model less stable are refused, unless it is unstable already.
     grows = is_unstable_within(tuning.tune(from_.deviations), _longest_s(measure))
     for damping, straight in dampings:
-        step = bounded_step(products + damping * np.diag(np.diagonal(products)), pull, *bounds)
+        step = bounded_step(products + damping * np.diag(np.diagonal(products)), rhs, *bounds)
         there = move_point(from_.hypothesis, step[t:], straight)
         try:
             model = tuning.tune(from_.deviations + step[:t])
@@ -260,9 +260,8 @@ def hypothesis_sensitivity(
         point, move = from_.hypothesis.point.copy(), moves[number]
         point[number] += move
         with np.errstate(over="ignore", invalid="ignore"):
-            change = errors - residuals_to_fit(
-                measure, measure.residuals(model, from_.hypothesis.placed_effects(point))
-            )
+            there = measure.residuals(model, from_.hypothesis.placed_effects(point))
+            change = errors - residuals_to_fit(measure, there)
             return np.divide(change, move, out=change)
 
     columns = list(map_(moved, range(len(moves))))  # type: ignore[operator]
@@ -279,13 +278,14 @@ def _longest(hypothesis: Hypothesis) -> FloatArray:
     return np.array([LARGEST_STEPS[number.parameter.scale] for number in hypothesis.numbers])
 
 
-def bounded_step(products: FloatArray, pull: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Least-squares step within bounds: parameters that would leave their range are fixed at its end (active set)."""
-    step, held = np.zeros(len(pull)), np.zeros(len(pull), dtype=bool)
-    for _ in range(2 * len(pull) + 2):
+def bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Least-squares step within bounds: parameters that would leave their range are fixed at its end (active set).
+    products, rhs: matrix and right-hand side of the normal equations."""
+    step, held = np.zeros(len(rhs)), np.zeros(len(rhs), dtype=bool)
+    for _ in range(2 * len(rhs) + 2):
         free = ~held
         wanted = step.copy()
-        rest = pull[free] - products[np.ix_(free, held)] @ step[held]
+        rest = rhs[free] - products[np.ix_(free, held)] @ step[held]
         wanted[free] = np.linalg.lstsq(products[np.ix_(free, free)], rest, rcond=1e-14)[0]
         out = free & ((wanted < low) | (wanted > high))
         if not out.any():

@@ -12,7 +12,8 @@ import numpy as np
 
 from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
+from analysis.diagnosis.errors.error_measure_rule import WINDOW_S
 from analysis.diagnosis.errors.evidence_from_residuals import without_gaps
 from analysis.diagnosis.errors.free_simulation import predicted_channels
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
@@ -29,8 +30,6 @@ _UNSEEN = 1e-9
 """Least singular value, relative to the largest, for which a direction of the initial state is fitted."""
 
 
-WINDOW_S = 1.0
-"""Shortest window."""
 STATES = 10.0
 """Least readings of a window per state: the fitted initial state then absorbs a tenth of an error at most by chance."""
 
@@ -49,6 +48,7 @@ class Windows:
     known: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
+    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
 
     @property
     def name(self) -> str:
@@ -93,53 +93,53 @@ class Windows:
         model = add_carried_weight(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         length = samples_of(self.window_s, recording.sample_rate_hz)
-        played = simulate_windows(
+        simulated = simulate_windows(
             model,
             record.command,
             (recording.sample_rate_hz, recording.hold),
-            under_conditions(effects, recording),
+            effects_under_conditions(effects, recording),
             Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
             Restarts(length * np.arange(len(states)), states),
         )
         with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-            left = (record.measured - predicted_channels(played, record.measured.shape[1])) / self.unit
+            residual = (record.measured - predicted_channels(simulated, record.measured.shape[1])) / self.unit
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
-        return played, self._without_states(structure, left, recording.sample_rate_hz, length)
+        return simulated, self._without_states(structure, residual, recording.sample_rate_hz, length)
 
     def _without_states(
-        self, structure: MechanicalModel, left: FloatArray, sample_rate_hz: float, length: int
+        self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, length: int
     ) -> FloatArray:
         """(n, c): residuals after projection on the free motion from other initial states of the windows."""
-        n, c = left.shape
+        n, c = residual.shape
         # A fit may try an unstable model.
         with np.errstate(over="ignore", invalid="ignore"):
             free = _free_motion(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
-            finite = np.isfinite(left).all() and np.isfinite(np.sum(free**2))
+            finite = np.isfinite(residual).all() and np.isfinite(np.sum(free**2))
         if not finite:
-            return left
+            return residual
         whole = n // length * length
-        found = left.copy()
+        found = residual.copy()
         if whole:
-            found[:whole] = _project_out(left[:whole].reshape(-1, length * c), free.reshape(length * c, -1)).reshape(
-                -1, c
-            )
+            found[:whole] = _project_out(
+                residual[:whole].reshape(-1, length * c), free.reshape(length * c, -1)
+            ).reshape(-1, c)
         if n > whole:
             found[whole:] = _project_out(
-                left[whole:].reshape(1, -1), free[: n - whole].reshape((n - whole) * c, -1)
+                residual[whole:].reshape(1, -1), free[: n - whole].reshape((n - whole) * c, -1)
             ).reshape(-1, c)
         return found
 
     def _evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> Evidence:
-        played, left = self._simulate_from_states(model, effects, record, states)
+        simulated, residual = self._simulate_from_states(model, effects, record, states)
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
         entered = actuator_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
-        found = smooth_motion(model, record, entered + played.axis_force, self.unit)
-        measured, predicted = without_gaps(record.measured, left * self.unit, played)
+        found = smooth_motion(model, record, entered + simulated.axis_force, self.unit)
+        measured, predicted = without_gaps(record.measured, residual * self.unit, simulated)
         has_position = measured.shape[1] > p
         return Evidence(
             model=model,
@@ -192,9 +192,9 @@ def _free_motion(structure: MechanicalModel, sample_rate_hz: float, length: int,
     return np.asarray(outputs[:, :, :count].transpose(0, 2, 1))
 
 
-def _project_out(left: FloatArray, free: FloatArray) -> FloatArray:
+def _project_out(residual: FloatArray, free: FloatArray) -> FloatArray:
     """Rows of left (windows, samples) after projection on the columns of free (samples, k)."""
     size = np.linalg.norm(free, axis=0)
     along, sizes, _ = np.linalg.svd(free / np.where(size > 0, size, 1.0), full_matrices=False)
     along = along[:, sizes > _UNSEEN * max(float(sizes[0]), np.finfo(float).tiny)]
-    return np.asarray(left - (left @ along) @ along.T)
+    return np.asarray(residual - (residual @ along) @ along.T)

@@ -129,11 +129,11 @@ def fit_first_linear_model(
 def _answers(model: MechanicalModel, recording: Recording) -> bool:
     """Whether the commands move the model at all. Where the response depends on them less than on the initial state, as
     on an axis that friction holds, the fitted masses and springs grow without bound."""
-    played = simulate_response(
+    simulated = simulate_response(
         model, fill_gaps(recording.command.samples), recording.sample_rate_hz, (), recording.hold
     )
     measured = np.nanstd(recording.response.samples, axis=0)
-    return bool((np.std(played.response, axis=0) >= LEAST_MODEL_ANSWER * measured).any())
+    return bool((np.std(simulated.response, axis=0) >= LEAST_MODEL_ANSWER * measured).any())
 
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:

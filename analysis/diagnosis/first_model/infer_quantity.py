@@ -85,13 +85,14 @@ def _likely_quantity(recordings: Sequence[Recording]) -> str:
     if not np.isfinite(motions[0].band_hz):
         return "position"
 
-    def use(columns: Sequence[int]) -> float:
+    def error_without(columns: Sequence[int]) -> float:
+        """Increase of the cross-validated error without these columns, relative to the power."""
         without = regression.cross_validated_errors([k for k in whole if k not in columns])
         return float((without - regression.cross_validated_errors(whole)).sum()) / power
 
     d = len(motions[0].channels)
-    twice, itself = use(range(d)), use(range(2 * d, 3 * d))
-    return "velocity" if twice < DERIVATIVE_NEEDED <= itself else "position"
+    second_derivative, itself = error_without(range(d)), error_without(range(2 * d, 3 * d))
+    return "velocity" if second_derivative < DERIVATIVE_NEEDED <= itself else "position"
 
 
 def _with_quantity(recording: Recording, quantity: str | tuple[str, ...]) -> Recording:

@@ -67,7 +67,7 @@ def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> Joint
     whole = np.sum([each[0] for each in own], axis=0), np.sum([each[1] for each in own], axis=0)
     found, spread = _solve(whole), _standard_errors(own, whole)
     fit = [regression.fit for regression in regressions]
-    crossed = [_solve((whole[0] - gram, whole[1] - pull)) for gram, pull in own]
+    crossed = [_solve((whole[0] - gram, whole[1] - cross)) for gram, cross in own]
     folds = _errors(fit, shape, crossed)
     test = [regression.test for regression in regressions]
     tested = len(test[0]) >= LEAST_TEST_BLOCKS and any(map(held_out_moves, regressions))
@@ -107,11 +107,11 @@ def _products(
     found = []
     for each in zip(*blocks, strict=True):
         count = shape.rows[0].shape[1]
-        gram, pull = np.zeros((count, count)), np.zeros(count)
+        gram, cross = np.zeros((count, count)), np.zeros(count)
         for block, row, power in zip(each, shape.rows, powers, strict=True):
             own = block_products(block, shape.columns)
-            gram, pull = gram + row.T @ own[0] @ row / power, pull + row.T @ own[1] / power
-        found.append((gram, pull))
+            gram, cross = gram + row.T @ own[0] @ row / power, cross + row.T @ own[1] / power
+        found.append((gram, cross))
     return found
 
 
@@ -125,7 +125,7 @@ def _standard_errors(own: Sequence[tuple[FloatArray, FloatArray]], whole: tuple[
     found = _solve(whole)
     size = np.sqrt(np.maximum(np.diagonal(whole[0]), 1e-300))
     inverse = np.linalg.inv(whole[0] / np.outer(size, size)) / np.outer(size, size)
-    scores = np.array([pull - gram @ found for gram, pull in own])
+    scores = np.array([cross - gram @ found for gram, cross in own])
     wide = len(own) / max(len(own) - 1, 1)
     return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ (wide * scores.T @ scores) @ inverse), 0.0)))
 

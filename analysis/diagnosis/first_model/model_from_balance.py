@@ -26,8 +26,9 @@ class FirstModel:
 
 
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
-    """recording: what `reduce_recordings` makes of it, where the balances hold more than one body per command. None
-    where not each command drives one measured motion. Raises MechanicalModelError."""
+    """A linear model with the masses, dampers and springs of force balances. recording: what `reduce_recordings` makes
+    of it, where the balances hold more than one body per command. None where not each command drives one measured
+    motion. Raises MechanicalModelError."""
     regressions = [balance.search.regression for balance in balances]
     count = len(balances)
     if count > len(regressions[0].motions[0].channels) or count != len(recording.response.channels):
@@ -93,11 +94,13 @@ def share_within(balances: Sequence[Balance], band_hz: float) -> float:
         for place in (regression.places[law] for law in laws):
             own = weights[begin : begin + place.stop - place.start]
             begin += len(own)
-            shares.append(_below([rows[:, place] @ own for rows in regression.columns], regression.motions, band_hz))
+            shares.append(
+                _mean_force([rows[:, place] @ own for rows in regression.columns], regression.motions, band_hz)
+            )
     return min(shares)
 
 
-def _below(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
+def _mean_force(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
     """The mean over all recordings is subtracted: where each runs one way, the friction differs between recordings at
     frequency zero."""
     within, whole, mean = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))

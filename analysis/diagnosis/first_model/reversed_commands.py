@@ -22,7 +22,7 @@ from analysis.diagnosis.data.measured_motion import is_read_as_free
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import REVERSED_SIGN_GAIN
 from analysis.wording import conjoin
-from equalizer.effects.turned_commands import with_turned_commands
+from equalizer.effects.command_sign import with_reversed_commands
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -70,7 +70,7 @@ def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel
     if not isinstance(turned, Sequence) or not set(turned) & set(channels):
         return model
     signs = [-1.0 if channel in turned else 1.0 for channel in channels]
-    return with_turned_commands(model, signs, channels, recording.response.channels)
+    return with_reversed_commands(model, signs, channels, recording.response.channels)
 
 
 def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:

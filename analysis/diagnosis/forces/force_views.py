@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.data.measured_motion import MeasuredMotion, measured_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.forces.inverse_dynamics import band_motion
-from analysis.diagnosis.forces.inverse_lines import inverse_lines
+from analysis.diagnosis.forces.inverse_response import inverse_response
 from analysis.diagnosis.forces.predicted_force import PredictedForce, edge_samples
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
@@ -41,7 +41,8 @@ class ForceViews:
 def force_views(
     records: Sequence[Observed], model: MechanicalModel, floors: Sequence[NoiseFloor], band_hz: float | None = None
 ) -> ForceViews:
-    """records: with motion, see `has_motion`. band_hz: up to which forces are compared; None = by the noise."""
+    """The error measure by forces along the measured motion, with its noise. records: with motion, see `has_motion`.
+    band_hz: up to which forces are compared; None = by the noise."""
     motions = [measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)]
     applied = [
         actuator_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
@@ -108,7 +109,7 @@ def _view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
 def _floor(model: MechanicalModel, motion: MeasuredMotion, floor: NoiseFloor, band_hz: float) -> NoiseFloor:
     frequency_hz, m = floor.frequency_hz, model.inputs
     pass_gain = low_pass_gain(frequency_hz, band_hz)[:, None, None]
-    gain = np.abs(pass_gain * inverse_lines(model, np.maximum(frequency_hz, 1e-3))[:, :m]) ** 2
+    gain = np.abs(pass_gain * inverse_response(model, np.maximum(frequency_hz, 1e-3))[:, :m]) ** 2
     assumed = (ASSUMED_NOISE * np.std(motion.position, axis=0)) ** 2
     density = np.einsum("lij,lj->li", gain, np.where(np.isfinite(motion.noise), motion.noise, assumed))
     freedom = np.full(m, float(np.max(floor.response.freedom, initial=1.0)))

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.forces.inverse_lines import inverse_lines, inverse_of
+from analysis.diagnosis.forces.inverse_response import fast_inverse_response, inverse_response
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import end_to_end_line, filter_by_gain, low_pass_gain
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _NEARLY_STILL_HZ = 1e-6
 """Frequency at which the derivative of the inverse at 0 Hz is computed."""
@@ -66,7 +65,7 @@ def required_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
     if model.coordinates == model.inputs:
         return _force_of_square_model(model, motion)
     position, sample_rate_hz = motion.position, motion.sample_rate_hz
-    m, inverse_at = model.inputs, inverse_of(model, len(position), sample_rate_hz / 2)
+    m, inverse_at = model.inputs, fast_inverse_response(model, len(position), sample_rate_hz / 2)
 
     def gain(frequency_hz: FloatArray) -> ComplexArray:
         within = low_pass_gain(frequency_hz, motion.band_hz)[:, None, None]
@@ -103,7 +102,7 @@ def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_
     m = model.inputs
     line = end_to_end_line(position)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
-    still = inverse_lines(model, np.array([0.0, _NEARLY_STILL_HZ]))
+    still = inverse_response(model, np.array([0.0, _NEARLY_STILL_HZ]))
     static, rate = still[0].real, still[1].imag / (2 * np.pi * _NEARLY_STILL_HZ)
     force_and_position = line @ static.T + slope @ rate.T
     velocity = np.broadcast_to(slope @ static[m:].T, (len(line), m))

@@ -37,8 +37,9 @@ class MissingForce:
 def missing_force(
     model: MechanicalModel, residuals: FloatArray, unit: FloatArray, sample_rate_hz: float, expected_n: FloatArray
 ) -> MissingForce:
-    """residuals: (n, c) in units of `unit` (c,); the response's channels, then the position's. expected_n: (m,),
-    expected rms of such a force; larger values pass more force and more noise."""
+    """Estimate the force along each driven axis that explains residuals (Wiener filter). residuals: (n, c) in units of
+    `unit` (c,); the response's channels, then the position's. expected_n: (m,), expected rms of such a force; larger
+    values pass more force and more noise."""
     n, c = residuals.shape
     length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
     transfer = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))

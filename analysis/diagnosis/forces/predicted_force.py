@@ -7,7 +7,7 @@ from typing import Self, TypeVar, cast
 import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, under_conditions
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.forces.inverse_dynamics import BandMotion, RequiredForce, band_motion, required_force
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
 from equalizer.effects.simulation.along_motion import actuator_force, force_along
@@ -41,6 +41,7 @@ class PredictedForce:
     known: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
+    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
     remembered: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
     """Last inputs and result by kind and record: laws are compared on one model, models on one command."""
 
@@ -52,7 +53,7 @@ class PredictedForce:
 
     def shorten(self) -> "PredictedForce":
         kept = [
-            (self._cut(record), motion)
+            (self._shorten_record(record), motion)
             for record, motion in zip(self.records, self.motions, strict=True)
             if (record.fit | record.choose).any()
         ]
@@ -64,7 +65,7 @@ class PredictedForce:
         whole = motion.position
         return motion if count == len(whole) else band_motion(whole[:count], motion.sample_rate_hz, self.band_hz)
 
-    def _cut(self, record: Observed) -> Observed:
+    def _shorten_record(self, record: Observed) -> Observed:
         """The record cut after the last sample to fit or to choose by, less the edge that the filter distorts."""
         cut, edge = record.shorten(), edge_samples(record.recording.sample_rate_hz, self.band_hz)
         inside = np.arange(len(cut.command)) < len(cut.command) - edge
@@ -97,7 +98,7 @@ class PredictedForce:
         next_force = np.concatenate([required.force[1:], required.force[-1:]])
         axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
         unbalanced = applied.within - (required.force + next_force) / 2
-        effects = under_conditions(effects, record.recording)
+        effects = effects_under_conditions(effects, record.recording)
         added = force_along(structure, effects, axis_motion, (record.command, unbalanced), rate_hz)
         # Both are means over the step that begins at a sample; the required force is the mean around the sample.
         total = applied.around

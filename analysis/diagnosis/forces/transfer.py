@@ -7,8 +7,7 @@ import numpy as np
 
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _WELL_CONDITIONED = 1e8
 """Largest condition number of the mode shapes for which modal coordinates are used."""

@@ -11,9 +11,9 @@ from scipy.special import gammaincc
 from equalizer.signals.signal import FloatArray
 
 IntArray = npt.NDArray[np.int64]
-_MEMORIES = 3.0
+_CORRELATION_TIMES = 3.0
 """Length of a block, in correlation times."""
-_COUNTED = 10
+_LEAST_EXCEEDED = 10
 """Number of permutations with a larger statistic from which the p-value is counted instead of fitted."""
 SMALLEST = 1e-6
 """Least p-value: the fitted tail is not trusted below it."""
@@ -43,19 +43,19 @@ def shuffle_blocks(strata: IntArray, block: int, random: np.random.Generator) ->
         length = stop - start
         size = max(1, min(block, length // _LEAST_BLOCKS))
         cut = stop - int(random.integers(length))
-        turned = np.concatenate([every[cut:stop], every[start:cut]])
+        rotated = np.concatenate([every[cut:stop], every[start:cut]])
         blocks = length // size
         whole = blocks * size
-        order[start : start + whole].reshape(blocks, size)[:] = turned[:whole].reshape(blocks, size)[
+        order[start : start + whole].reshape(blocks, size)[:] = rotated[:whole].reshape(blocks, size)[
             random.permutation(blocks)
         ]
-        order[start + whole : stop] = turned[whole:]
+        order[start + whole : stop] = rotated[whole:]
     return order
 
 
 def block_length(series: FloatArray) -> int:
     """Length of a block in samples: three correlation times of the series (n,), at least 1."""
-    return max(1, round(_MEMORIES * correlation_time(series)))
+    return max(1, round(_CORRELATION_TIMES * correlation_time(series)))
 
 
 def permutation_p_values(
@@ -73,5 +73,5 @@ def permutation_p_values(
     p_values = gammaincc(mean**2 / variance, observed * mean / variance)
     # Where enough permutations had a larger statistic, their share is used instead of the fitted tail.
     counted = (np.sum(chance >= observed, axis=0) + 1) / (permutations + 1)
-    believed = np.where(counted > _COUNTED / (permutations + 1), counted, np.maximum(p_values, SMALLEST))
-    return np.asarray(believed, dtype=np.float64)
+    chosen = np.where(counted > _LEAST_EXCEEDED / (permutations + 1), counted, np.maximum(p_values, SMALLEST))
+    return np.asarray(chosen, dtype=np.float64)

@@ -40,7 +40,7 @@ class CleanFloor:
         return max(beside, default=0.0)
 
 
-def learned_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
+def clean_floor_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
     """Sentence about the clean recordings; empty without any."""
     if not floor.channels:
         return ""

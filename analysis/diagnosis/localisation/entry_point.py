@@ -26,8 +26,7 @@ from analysis.diagnosis.settings import (
     SENSOR_SHOWN,
 )
 from equalizer.plant.effect_vocabulary import Place
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _BLOCK_LINES = 8
 """Number of neighbouring (correlated) lines that count as one when two entries are compared."""
@@ -48,8 +47,9 @@ class SensorRule:
 
 
 def sensor_rule(spectra: ResidualSpectra, derivative: int) -> SensorRule | None:
-    """derivative: order of the position's time derivative that the response is. None where position and response have
-    different numbers of channels."""
+    """Compare position and response: whether a sensor's own error explains their difference. derivative: order of the
+    position's time derivative that the response is. None where position and response have different numbers of
+    channels."""
     p = spectra.responses
     if spectra.residual.shape[2] != 2 * p:
         return None
@@ -115,8 +115,8 @@ class EntryPoint:
 def entry_point(
     spectra: ResidualSpectra, entries: Sequence[Entry], derivative: Literal[0, 1, 2] | None = 2
 ) -> EntryPoint:
-    """derivative: order of the position's time derivative that the response is, channel by channel (2 = acceleration);
-    None where it is none.
+    """Rank the components through which a mismatch may enter. derivative: order of the position's time derivative that
+    the response is, channel by channel (2 = acceleration); None where it is none.
 
     Raises ValueError where an entry's directions do not fit the lines and channels.
     """

@@ -105,3 +105,4 @@ def _slope(doublings: FloatArray, relative_db: FloatArray, lines: FloatArray) ->
 _TINY = 1e-300
 """Lower limit of an amplitude, so that its logarithm is finite."""
 _ALL: Band = (0.0, np.inf)
+"""The whole band (Hz)."""

@@ -12,9 +12,8 @@ from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_signal
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _WINDOW_S = 2.0
 """Length of a window where nothing is periodic."""

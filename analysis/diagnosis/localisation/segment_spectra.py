@@ -11,9 +11,8 @@ from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, period_spectra
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.identification.frequency_response.noise_floor import period_variance, smooth_over_lines
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.signal import ComplexArray, FloatArray, Signal
 
 _SMOOTHED_LINES = 9
 """Lines over which the spread between periods is averaged."""

@@ -170,8 +170,8 @@ def _squares_after_retuning(
     tuned, t = np.zeros(len(known)), len(rival.deviations)
     wanted = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + differs
     whole, least, rest = float(differs @ differs), np.inf, differs
-    pull = moves @ differs
-    straight = whole - float(pull @ np.linalg.lstsq(moves @ moves.T + known, pull, rcond=None)[0])
+    rhs = moves @ differs
+    straight = whole - float(rhs @ np.linalg.lstsq(moves @ moves.T + known, rhs, rcond=None)[0])
     for _ in range(RETUNED):
         step = np.linalg.lstsq(moves @ moves.T + known, moves @ rest - known @ tuned, rcond=None)[0]
         tuned = tuned + step
@@ -197,8 +197,8 @@ def _simulate(
     model: MechanicalModel = bench.tuning.tune(deviations)
     model = add_mass(model, experiment.added) if experiment.added else model
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-        played = simulate_mechanism(
+        simulated = simulate_mechanism(
             model, experiment.commands, bench.sample_rate_hz, hypothesis.placed_effects(point), bench.hold
         )
-        signals = np.hstack([played.response, played.position])[:, : len(bench.noise)]
+        signals = np.hstack([simulated.response, simulated.position])[:, : len(bench.noise)]
         return np.asarray((signals / bench.noise).ravel())

@@ -19,7 +19,7 @@ USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
 ADDED_SHARE = 0.12
 """Known weight to attach, relative to the grounded mass."""
 RELEASES = 4
-"""How often the handle is let go, to either side in turn."""
+"""Releases of the deflected handle in a free-decay experiment, to either side in turn."""
 _FADE = 1 / 16
 """Fade at both ends, over an experiment's usual length."""
 
@@ -41,7 +41,8 @@ class Experiment:
 
 
 def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, level: float) -> tuple[Experiment, ...]:
-    """axis: where the rivals act. level: the highest that was recorded; no higher one is proposed."""
+    """Recordings that can be proposed. axis: where the rivals act. level: the highest that was recorded; no higher one
+    is proposed."""
     usual_hz = min(USUAL_HZ, USUAL_SHARE * sample_rate_hz)
     fastest_hz = FASTEST_SHARE * sample_rate_hz
     slowest_hz = min(SLOWEST_HZ, SLOWEST_SHARE * usual_hz)

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _TRANSIENT_RATIO = 2.0
 """Ratio of a period's difference from the last one, first third over last third (energy), above which it has not

@@ -40,7 +40,7 @@ def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise |
     if length < _LEAST_SAMPLES:
         return None
     variances = []
-    for start, stop in _rests(recording, _WINDOW_S):
+    for start, stop in _rest_intervals(recording, _WINDOW_S):
         for at in range(start, stop - length + 1, length):
             stretch = samples[at : at + length]
             if np.isfinite(stretch).all():
@@ -59,7 +59,7 @@ def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArr
         return None
     hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
     powers = []
-    for start, stop in _rests(recording, SETTLING_S):
+    for start, stop in _rest_intervals(recording, SETTLING_S):
         for at in range(start, stop - length + 1, length // 2):
             stretch = samples[at : at + length]
             if np.isfinite(stretch).all():
@@ -114,7 +114,7 @@ def _longest_whole(samples: FloatArray) -> tuple[int, int]:
     return int(longest[0]), int(longest[1])
 
 
-def _rests(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
+def _rest_intervals(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
     """Stretches without excitation, after settling. Recordings begin at rest."""
     driven = ~(instrument_signal(recording) == 0).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[True], driven, [True]]).astype(np.int8)))

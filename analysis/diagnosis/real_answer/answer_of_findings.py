@@ -32,8 +32,8 @@ def answer_of_findings(
     names: tuple[str, str, str],
     nominal: Mapping[str, float],
 ) -> RealAnswer:
-    """names: of folder, recording and what it is. What only the caller knows (further tests, a pair, objections, the
-    time it took) is left empty."""
+    """The answer to a real recording from the findings of its diagnosis. names: of folder, recording and what it is.
+    What only the caller knows (further tests, a pair, objections, the time it took) is left empty."""
     diagnosis, box = found.diagnosis, found.black_box
     folder, recording_name, title = names
     return RealAnswer(

@@ -148,7 +148,7 @@ def real_answer_to_json(answer: RealAnswer) -> dict[str, Any]:
 
 
 def real_answer_from_json(document: dict[str, Any]) -> RealAnswer:
-    """document: without format and version. Raises RealAnswerError."""
+    """Parse the document of an answer. document: without format and version. Raises RealAnswerError."""
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:

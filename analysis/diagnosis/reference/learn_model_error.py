@@ -6,10 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.choose_measure import Chosen, measure_of
-from analysis.diagnosis.errors.coloured_measure import ColouredMeasure, whiten_measure
+from analysis.diagnosis.errors.coloured_measure import (
+    ColouredMeasure,
+    WhiteningFilter,
+    whiten_measure,
+    whitening_filter,
+)
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.tuning import Tuning, tuning_of
-from analysis.diagnosis.errors.whitening_filter import WhiteningFilter, whitening_filter
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, learn_floor
 from analysis.diagnosis.localisation.mismatch_maps import cells_of
@@ -66,9 +70,9 @@ class LearnedError:
 def learn_model_error(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
 ) -> LearnedError:
-    """clean: of the same device, alike in channels and units; the model is re-tuned to each separately, because
-    recordings of different days differ. diagnosed: the recordings to diagnose, with the same measure. Raises
-    NothingLearned where that cannot be."""
+    """The residual spectrum of the re-tuned model on clean recordings, as noise for the search. clean: of the same
+    device, alike in channels and units; the model is re-tuned to each separately, because recordings of different days
+    differ. diagnosed: the recordings to diagnose, with the same measure. Raises NothingLearned where that cannot be."""
     error = measure_of(diagnosed, model, clean).measure.name
     lessons: list[_Lesson] = []
     for number, recording in enumerate(clean):
@@ -93,7 +97,7 @@ def learn_model_floor(
 
 
 def require_alike(learned_by: str, error: str) -> None:
-    """Raises NothingLearned."""
+    """Require that clean and diagnosed recordings have the same error measure. Raises NothingLearned."""
     if learned_by != error:
         raise NothingLearned(
             f"the clean recordings can only be compared by {learned_by}, those to diagnose by {error}, so that one "

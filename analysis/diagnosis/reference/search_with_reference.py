@@ -28,8 +28,9 @@ def search_with_reference(
     progress: Progress,
     time_left: TimeBudget,
 ) -> SearchResult:
-    """context: as without reference recordings, but for what is certain. Residuals of the result are by its own
-    measure, with the model error of the reference recordings counted as noise.
+    """Search with the model's error on clean recordings as noise. context: as without reference recordings, but for
+    what is certain. Residuals of the result are by its own measure, with the model error of the reference recordings
+    counted as noise.
 
     Where the residual is much larger than that, whitening helps little: then effects are also searched for with the
     plain residual, and the result with the smaller error is kept.

@@ -13,7 +13,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.first_model.reversed_commands import as_recorded
-from analysis.diagnosis.localisation.clean_floor import CleanFloor, learned_sentence
+from analysis.diagnosis.localisation.clean_floor import CleanFloor, clean_floor_sentence
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, whole_mismatch
 from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
@@ -71,7 +71,7 @@ def assemble_findings(
         signatures=examined.signatures,
         black_box=examined.black_box,
         remarks=_remarks(
-            (_still_sentence(measure), learned_sentence(learned, channels), in_samples), time_series, tuning, floors
+            (_still_sentence(measure), clean_floor_sentence(learned, channels), in_samples), time_series, tuning, floors
         ),
         maps=maps.cells,
         local=examined.local,

@@ -25,7 +25,7 @@ from analysis.diagnosis.errors.output_error import (
     sensitivity,
 )
 from analysis.diagnosis.forces.inverse_dynamics import band_motion
-from analysis.diagnosis.forces.inverse_lines import zeros_of
+from analysis.diagnosis.forces.inverse_response import zeros_of
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.periods import settled_periods
 from analysis.diagnosis.search.screening import ScreenedHypothesis, screen

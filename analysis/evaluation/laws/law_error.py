@@ -39,13 +39,15 @@ def _axis_error(laws: Sequence[Law], fresh: FreshMotion, axis: str) -> float:
         found = found + predicted - (0.0 if replaced is None else fresh.columns[replaced])
     if not np.isfinite(found).all():
         return float("inf")
-    own = [fresh.columns[name] for name in ((f"a{axis}",) if fresh.response else (f"a{axis}", f"v{axis}", axis))]
-    base = np.linalg.qr(np.column_stack([*(_normalise(column) for column in own), np.ones(len(true))]))[0]
+    fitted_by_model = [
+        fresh.columns[name] for name in ((f"a{axis}",) if fresh.response else (f"a{axis}", f"v{axis}", axis))
+    ]
+    base = np.linalg.qr(np.column_stack([*(_normalise(column) for column in fitted_by_model), np.ones(len(true))]))[0]
 
-    def beside(force: FloatArray) -> float:
+    def norm_beyond_model(force: FloatArray) -> float:
         return float(np.linalg.norm(force - base @ (base.T @ force)))
 
-    return beside(true - found) / max(beside(true), 1e-300)
+    return norm_beyond_model(true - found) / max(norm_beyond_model(true), 1e-300)
 
 
 def _begin_at_rest(fresh: FreshMotion) -> Mapping[str, FloatArray]:

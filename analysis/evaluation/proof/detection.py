@@ -15,7 +15,7 @@ LEAST_DRAWS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Strip:
+class EffectDraws:
     """All draws of an effect with their outcomes by strength, and the strength from which an oracle detects it."""
 
     effect: str
@@ -37,14 +37,14 @@ class Part:
     of: int
 
 
-def detection_strips(singles: Sequence[Outcome]) -> tuple[Strip, ...]:
+def detection_strips(singles: Sequence[Outcome]) -> tuple[EffectDraws, ...]:
     """A strip per effect, by name. singles: outcomes with a single concealed effect."""
     names = sorted({single.names[0] for single in singles})
     found = []
     for name in names:
         own = [single for single in singles if single.names[0] == name]
         draws = tuple(sorted((each.strengths[0], classify_outcome(each)) for each in own))
-        found.append(Strip(name, draws, oracle_threshold(own)))
+        found.append(EffectDraws(name, draws, oracle_threshold(own)))
     return tuple(found)
 
 

@@ -14,6 +14,7 @@ from analysis.evaluation.proof.share import Figure, pooled_share, share, statist
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 TURN = 2 * math.pi
+"""A full turn (rad), by which phases may differ."""
 
 
 def nearest_true_value(name: str, estimate: float, values: Mapping[str, float]) -> float:

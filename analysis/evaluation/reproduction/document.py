@@ -34,6 +34,8 @@ class Finding:
 
 @dataclass(frozen=True, config=STRICT)
 class FigureFindings:
+    """One published figure beside its reproduction."""
+
     figure: Annotated[int, Field(ge=1, le=5)]
     title: str
     source: Annotated[str, Field(description="Where in the paper.")]
@@ -76,6 +78,8 @@ class UsedModel:
 
 @dataclass(frozen=True, config=STRICT)
 class Reproduction:
+    """The whole document."""
+
     device: str
     subjects: int
     seed: int
@@ -98,7 +102,8 @@ def reproduction_to_json(reproduction: Reproduction) -> dict[str, Any]:
 
 
 def reproduction_from_json(document: dict[str, Any]) -> Reproduction:
-    """document: without format and version. Raises ReproductionError with every problem, by its place."""
+    """Parse the document of a reproduction. document: without format and version. Raises ReproductionError with every
+    problem, by its place."""
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:

@@ -7,8 +7,7 @@ import numpy as np
 from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.evaluation.reproduction.played_response import PlayedResponse, played_row
 from analysis.wording import number
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 RESONANCE_HZ = (9.0, 14.0)
 """Range around the published resonance at 11 Hz."""
@@ -52,7 +51,8 @@ class EqualizedRows:
 def equalized_findings(
     rows: EqualizedRows, held_out: tuple[float, float] | None, remarks: tuple[str, ...] = ()
 ) -> FigureFindings:
-    """held_out: error of the centre's model on what was kept from it, and the same of the device without friction."""
+    """Findings of figure 5. held_out: error of the centre's model on what was kept from it, and the same of the device
+    without friction."""
     findings = (
         _resonance(rows),
         _peaks(rows),

@@ -8,9 +8,8 @@ import numpy as np
 
 from analysis.evaluation.reproduction.document import PlayedRow
 from equalizer.signals.excitation import log_sweep
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.multisine import lines_between, multisines
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.quality import quality
 
 SignalKind = Literal["sweep", "multisine"]

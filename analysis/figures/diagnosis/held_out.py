@@ -40,7 +40,7 @@ class Excerpt:
 def held_out_picture(
     time_series: Sequence[TimeSeries], noise_rms: Mapping[str, float], errors: ChannelErrors
 ) -> Picture:
-    """errors: by stage and channel, in units of the noise."""
+    """Figure of held-out samples with the predictions. errors: by stage and channel, in units of the noise."""
     excerpt = find_excerpt(time_series, noise_rms)
     where = ""
     if excerpt is not None:

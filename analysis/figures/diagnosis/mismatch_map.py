@@ -58,7 +58,8 @@ def driving_inputs(maps: Maps) -> tuple[str, ...]:
 
 
 def mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
-    """number: of the driving input in `driving_inputs`; all but the first are folded. unit: of the command."""
+    """Mismatch map of one driving input. number: of the driving input in `driving_inputs`; all but the first are
+    folded. unit: of the command."""
     input_ = driving_inputs(maps)[number]
     return Picture(
         name=f"mismatch-map-{number + 1}",

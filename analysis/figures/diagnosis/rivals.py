@@ -90,8 +90,8 @@ def draw_rivals(tried: Sequence[TriedExplanation], retuned: TriedExplanation, he
             axes.plot(item.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
     axes.axvline(retuned.seen, color=RETUNED.colour, linestyle=RETUNED.dash, linewidth=RETUNED.width, zorder=1)
     axes.axvline(1, color=BLACK, linewidth=1.0, zorder=1)
-    _mark(axes, 1.0, "noise", "right")
-    _mark(axes, retuned.seen, "re-tuned", "left")
+    _draw_mark(axes, 1.0, "noise", "right")
+    _draw_mark(axes, retuned.seen, "re-tuned", "left")
     axes.set_yticks(range(len(tried)), [each.words for each in tried])
     if held:
         axes.get_yticklabels()[0].set_fontweight("bold")
@@ -103,7 +103,7 @@ def draw_rivals(tried: Sequence[TriedExplanation], retuned: TriedExplanation, he
     return figure
 
 
-def _mark(axes: Axes, at: float, words: str, side: Literal["left", "right"]) -> None:
+def _draw_mark(axes: Axes, at: float, words: str, side: Literal["left", "right"]) -> None:
     axes.annotate(
         words, (at, 1), xycoords=("data", "axes fraction"), xytext=(5 if side == "right" else -5, 2),
         textcoords="offset points", ha=side, fontsize=8.5, annotation_clip=False,

@@ -1,4 +1,4 @@
-"""What was measured of each interval near the cap, as sentences beside the interval and as a table."""
+"""Measured coverage of each interval near the cap, as sentences beside the interval and as a table."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -27,6 +27,7 @@ USUAL_NOISE_DB = 1.0
 NOTICEABLE = 1.0
 """d' of one just noticeable difference."""
 CONFIDENCE = 0.95
+"""Confidence of the intervals."""
 
 
 @dataclass(frozen=True, slots=True)

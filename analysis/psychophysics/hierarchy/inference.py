@@ -28,7 +28,7 @@ FAR_DB = 32.0
 
 
 FEWEST_PEOPLE = 3
-"""For an interval of a mean over people."""
+"""Fewest participants for a confidence interval of a mean over people."""
 
 
 @dataclass(frozen=True, slots=True)

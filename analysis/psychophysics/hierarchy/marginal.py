@@ -78,15 +78,15 @@ class Marginal:
         by_latent, by_lapse = self.likelihood.trace_derivatives(self.latent, lapse, inverse)
         # The sensitivity of the mode depends on the observed curvature; the volume uses the expected one.
         adjoint = np.linalg.solve(precision - found.second, by_latent[..., None])[..., 0]
-        pull = deviation @ precision
+        weighted_deviation = deviation @ precision
         value = (
             found.value
-            - 0.5 * np.einsum("na,na->n", deviation, pull)
+            - 0.5 * np.einsum("na,na->n", deviation, weighted_deviation)
             + 0.5 * np.linalg.slogdet(precision)[1]
             + 0.5 * np.linalg.slogdet(inverse)[1]
         )
         scores = np.empty((len(value), layout.size))
-        by_centre = pull - 0.5 * adjoint @ precision
+        by_centre = weighted_deviation - 0.5 * adjoint @ precision
         scores[:, :k], scores[:, layout.slope] = by_centre[:, :k], by_centre[:, k]
         for place, change, log_det in _precision_derivatives(numbers, k):
             moved = deviation @ change

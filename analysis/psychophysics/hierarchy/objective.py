@@ -33,6 +33,7 @@ LOG_SD_BOUNDS = ((-5.0, 3.5), (-5.0, 3.5), (-5.0, 0.7), (-5.0, 1.1))
 """Bounds of the logarithm of each spread, in the order of `Layout.log_sds`: 0.007 to 33 dB, to 2 in log-slopes, to 3 in
 d'. At the lower bound persons do not differ, at the upper one they have nothing in common."""
 LAPSE_BOUNDS = (float(logit(1e-4)), float(logit(0.3)))
+"""Bounds of the lapse rate (logit): 0.01 % to 30 %."""
 
 
 class Objective:

@@ -123,7 +123,7 @@ def at_played_frequencies(answers: Answers) -> Answers:
 
 
 def estimate_persons(subjects: Sequence[str], latent: FloatArray, cap_db: float) -> tuple[PersonEstimate, ...]:
-    """latent: (n, k + 2), thresholds in dB, log-slope, criterion."""
+    """Thresholds, slope and criterion of each person. latent: (n, k + 2), thresholds in dB, log-slope, criterion."""
     return tuple(
         PersonEstimate(
             subject=subject,

@@ -14,9 +14,9 @@ SETTLED = {COARSE: 0.1, FINE: 1e-3, FIXED: 1e-3}
 """Twice the gain in log-likelihood that the next step would bring: 0.001 is a thirtieth of a standard error, and the
 step before it was that of a quadratic function already."""
 LONGEST_STEP = 2.0, 0.5
-"""In a mean (dB), and in all logarithms."""
+"""Longest Newton step, in a mean (dB) and in all logarithms."""
 LEAST_CURVATURE = 1e-3
-"""Of a Newton step: below it its length is undetermined."""
+"""Least curvature for a Newton step: below it the step's length is undetermined."""
 SAME_HEIGHT = 0.03
 """Nodes move from step to step: log-likelihoods closer than this are equal."""
 SHORTER = 3

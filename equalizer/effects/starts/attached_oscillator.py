@@ -7,8 +7,7 @@ import numpy as np
 
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import cross_density, spectral_density
 
 WINDOW_S, DRIVEN, CHANCE = 2.0, 1e-4, 0.02

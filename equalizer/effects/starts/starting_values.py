@@ -70,16 +70,17 @@ class PartialRegression:
         scale = np.linalg.norm(nuisances, axis=0)
         left, sizes, _ = np.linalg.svd(nuisances / np.where(scale > 0, scale, 1.0), full_matrices=False)
         self._known = left[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), np.finfo(float).tiny)]
-        self.force = self._without(force)
+        self.force = self._residual_without(force)
         """(n,): residual of the force after projection on the nuisance regressors."""
         self._power = max(float(self.force @ self.force), np.finfo(float).tiny)
 
-    def _without(self, shapes: FloatArray) -> FloatArray:
+    def _residual_without(self, shapes: FloatArray) -> FloatArray:
         return np.asarray(shapes - self._known @ (self._known.T @ shapes))
 
     def fit(self, *laws: FloatArray) -> LawFit:
-        """laws: (n,) each, evaluated with the factor 1."""
-        shapes = self._without(np.column_stack(laws))
+        """Least-squares fit of laws to the missing force, the linear part projected out. laws: (n,) each, evaluated
+        with the factor 1."""
+        shapes = self._residual_without(np.column_stack(laws))
         size = np.linalg.norm(shapes, axis=0)
         shapes = shapes / np.where(size > 0, size, 1.0)
         products = shapes.T @ self.force

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def worst_coupling(response: ComplexArray) -> FloatArray:
@@ -20,7 +19,7 @@ def worst_coupling(response: ComplexArray) -> FloatArray:
 
 
 def require_equal_axes(response: ComplexArray) -> None:
-    """Raises ValueError unless the response (..., outputs, inputs) is square."""
+    """Require as many outputs as inputs. Raises ValueError unless the response (..., outputs, inputs) is square."""
     outputs, inputs = response.shape[-2:]
     if outputs != inputs:
         raise ValueError(f"coupling compares equal axes, but there are {outputs} outputs and {inputs} inputs")

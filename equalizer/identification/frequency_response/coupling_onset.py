@@ -14,8 +14,7 @@ from scipy.special import ndtr, ndtri
 from equalizer.identification.frequency_response.coupling import require_equal_axes, worst_coupling
 from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
 from equalizer.identification.frequency_response.local_polynomial import LocalPolynomial
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _HIGHEST_RESAMPLED = 1.5
 """Frequency up to which the resampled curves are computed, as a multiple of the onset."""
@@ -60,8 +59,8 @@ class CouplingOnset:
 
 
 def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -> CouplingOnset:
-    """response: as estimated, not smoothed yet, with inputs and outputs in one frame. Raises ValueError if it is not
-    square, or has too few lines above the noise."""
+    """The frequency from which driving one axis moves the others. response: as estimated, not smoothed yet, with inputs
+    and outputs in one frame. Raises ValueError if it is not square, or has too few lines above the noise."""
     rule = rule or OnsetRule()
     require_equal_axes(response.response)
     lines = response.of_lines(response.reliable)

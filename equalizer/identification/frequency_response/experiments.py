@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 BROADBAND_KINDS = ("sweep", "multisine", "noise", "binary")
 TRANSIENT_S = 5.0

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -55,7 +54,7 @@ class FrequencyResponse:
         return self.of_lines((self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz))
 
     def of_lines(self, chosen: BoolArray) -> "FrequencyResponse":
-        """chosen: (lines,)."""
+        """The response on chosen lines. chosen: (lines,)."""
         return FrequencyResponse(
             self.frequency_hz[chosen],
             self.response[chosen],

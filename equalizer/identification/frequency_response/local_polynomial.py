@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,6 +96,6 @@ def _scatter(response: FrequencyResponse, local: LocalPolynomial) -> FloatArray:
     basis, _ = np.linalg.qr(_powers(response.frequency_hz, local.window, local.order))
     values = response.response[local.window]
     explained = np.abs(np.einsum("lko,lkpm->lopm", basis, values)) ** 2
-    left = np.sum(np.abs(values) ** 2, axis=1) - np.sum(explained, axis=1)
-    power: FloatArray = np.maximum(left, 0.0) / (values.shape[1] - local.order - 1)
+    residual_power = np.sum(np.abs(values) ** 2, axis=1) - np.sum(explained, axis=1)
+    power: FloatArray = np.maximum(residual_power, 0.0) / (values.shape[1] - local.order - 1)
     return power

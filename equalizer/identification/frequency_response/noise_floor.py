@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from equalizer.identification.frequency_response.experiments import instrument_signal
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 SETTLING_S = 0.5
 """Settling time after the last excitation, before samples count as rest."""
@@ -60,7 +59,7 @@ def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> Flo
         length = round(_REST_WINDOW_S * recording.sample_rate_hz)
         lines_hz = np.arange(1, length // 2) * recording.sample_rate_hz / length
         hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
-        for start, stop in _rests(recording):
+        for start, stop in _rest_intervals(recording):
             for at in range(start, stop - length + 1, length // 2):
                 period = recording.response.samples[at : at + length]
                 if np.isfinite(period).all():
@@ -75,7 +74,7 @@ def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> Flo
     return np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
 
 
-def _rests(recording: Recording) -> list[tuple[int, int]]:
+def _rest_intervals(recording: Recording) -> list[tuple[int, int]]:
     """Intervals (start, stop) without excitation, after settling. Recordings begin at rest."""
     driven = ~(instrument_signal(recording) == 0).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[True], driven, [True]]).astype(np.int8)))

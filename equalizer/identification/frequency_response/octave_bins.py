@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import BoolArray
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LEAST_INDEPENDENCE = 0.1
 """Least singular value of the matrix of excited directions, each of unit length."""

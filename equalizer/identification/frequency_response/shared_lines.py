@@ -17,8 +17,7 @@ from equalizer.identification.frequency_response.noise_floor import (
     period_variance,
     smooth_over_lines,
 )
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _RANK_TOLERANCE = 1e-6
 """Rank tolerance, relative to the strongest line's amplitude: anything smaller is rounding."""

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _STARTING_ROUNDS, _NEWTON_ROUNDS = 3, 8
 """Reweighted linear fits that give a start, and Newton steps from it."""

@@ -11,8 +11,7 @@ import numpy as np
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines
 from equalizer.identification.mechanical.mechanical_response import free_response, sampled_response
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _STATE_LINES = 3000
 """Most lines to which the initial state is fitted."""

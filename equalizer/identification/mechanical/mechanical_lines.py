@@ -13,9 +13,8 @@ import numpy.typing as npt
 
 from equalizer.identification.frequency_response.frequency_response import BoolArray
 from equalizer.identification.frequency_response.noise_floor import period_variance, smooth_over_lines
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Hold, Recording, Segment
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SPARE = 8
 """Least number of lines beyond the unknowns of a window."""

@@ -10,9 +10,8 @@ from equalizer.identification.frequency_response.noise_floor import smooth_over_
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines, have_same_lines
 from equalizer.identification.mechanical.mechanical_response import PoleForm, free_response, pole_form, sampled_response
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Hold
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 LARGEST = 0.25
 """Largest scatter that is counted as noise, relative to a channel's largest response near a line. Segments differ more
@@ -59,10 +58,10 @@ def _scatter(alike: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArra
     strengths = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
     known = strengths.min(axis=1) > 1e-6 * strengths.max()
     explained = np.sum(np.abs(np.swapaxes(basis.conj(), 1, 2) @ response) ** 2, axis=1)
-    left = np.maximum(np.sum(np.abs(response) ** 2, axis=1) - explained, 0.0)
+    residual_power = np.maximum(np.sum(np.abs(response) ** 2, axis=1) - explained, 0.0)
     freedom = np.count_nonzero(driven[:, :, 0], axis=1) - m
     usable = known & (freedom > 0)
-    total = smooth_over_lines(np.where(usable[:, None], left, 0.0), _LINES)
+    total = smooth_over_lines(np.where(usable[:, None], residual_power, 0.0), _LINES)
     return np.asarray(total / np.maximum(smooth_over_lines(np.where(usable, freedom, 0.0)[:, None], _LINES), 1e-12))
 
 

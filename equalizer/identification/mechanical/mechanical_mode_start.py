@@ -15,8 +15,7 @@ from equalizer.identification.mechanical.mechanical_response import sampled_resp
 from equalizer.identification.mechanical.mechanical_start import solve_scaled, symmetric_matrix, triangle_pairs
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _GRID = 60
 """Number of resonance frequencies that are tried."""

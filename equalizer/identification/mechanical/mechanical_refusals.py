@@ -68,8 +68,8 @@ def _refuse_samples(recordings: Sequence[Recording]) -> None:
 
 
 def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
-    """error: (p + 1,), of the simulation relative to the response. Raises MechanicalFitRefused where no channel is
-    explained."""
+    """Refuse a fit that explains no channel. error: (p + 1,), of the simulation relative to the response. Raises
+    MechanicalFitRefused where no channel is explained."""
     if error[:-1].min() > ALL_NOISE:
         raise MechanicalFitRefused(
             f"the commands do not tell what {', '.join(channels)} will do: a fitted model leaves "
@@ -78,7 +78,7 @@ def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
 
 
 def refuse_unstable(final: RefinedFit[Structure] | RefinedFit[ModalStructure]) -> None:
-    """Raises MechanicalFitRefused for a fit with unstable poles."""
+    """Refuse an unstable fit. Raises MechanicalFitRefused for a fit with unstable poles."""
     from equalizer.identification.mechanical.mechanical_response import pole_form
 
     form = pole_form(final.structure.model(final.unknowns))

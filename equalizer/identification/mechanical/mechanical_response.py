@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Hold
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SMALL = 1e-9
 """Magnitude of a pole times the step below which it is taken as an integrator."""

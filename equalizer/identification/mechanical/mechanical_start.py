@@ -9,8 +9,7 @@ from equalizer.identification.mechanical.mechanical_lines import SegmentLines
 from equalizer.identification.mechanical.mechanical_response import sensor_response
 from equalizer.identification.mechanical.mechanical_structure import Structure, pack_mass, pack_square_root
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LEAST_EIGENVALUE = 0.05
 """Least eigenvalue of the starting mass matrix, relative to the largest."""

@@ -10,8 +10,7 @@ from equalizer.identification.mechanical.mechanical_misfit import LineGroup
 from equalizer.identification.mechanical.mechanical_response import pole_responses, sensor_response
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 _GRID = 80
 """Number of frequencies that are tried, on a logarithmic grid."""

@@ -18,8 +18,8 @@ from equalizer.identification.state_space.weighted_lines import (
     bin_centres_hz,
     group_lines,
 )
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
+from equalizer.signals.signal import ComplexArray
 
 LINES_PER_BIN = 5
 """Lines that are averaged for the first refinement, in a narrow band."""

@@ -11,9 +11,8 @@ from scipy.signal import resample_poly
 
 from equalizer.identification.state_space.modal_form import ModalForm, from_poles
 from equalizer.identification.state_space.stable_poles import stabilise_poles
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 RATE_OVER_BAND = 3.5
 """Records are decimated to about this many samples per period of the band's upper end."""

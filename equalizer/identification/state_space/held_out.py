@@ -7,9 +7,8 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import simulate
-from equalizer.signals.lockin import ComplexArray
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 LEAD_S = 2.0
 """Seconds simulated before a segment, where the recording has them, for the state to settle..."""

@@ -8,8 +8,7 @@ from equalizer.identification.frequency_response.frequency_response import BoolA
 from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 NOISE_TRUSTED = 1.1
 """Residual power over noise power below which no misfit is claimed: the noise itself is estimated from few periods."""
@@ -39,12 +38,12 @@ ONE_SIDED_95 = 1.645
 def misfit_of(lines: WeightedLines, modelled: ComplexArray, inside: BoolArray, unknowns: int) -> Misfit:
     """Misfit of modelled responses (lines, p, m). inside: (lines,), which lines count. unknowns: real numbers that were
     fitted."""
-    left = (modelled - lines.response)[inside]
+    residual = (modelled - lines.response)[inside]
     weight = lines.weight[inside]
     size = float((np.abs(lines.response[inside]) ** 2).sum())
-    beyond = float((np.abs(left) ** 2).sum() - NOISE_TRUSTED * (1 / weight**2).sum())
-    hidden = float((np.abs(left) ** 2).sum() - _lower_noise_bound(1 / weight**2, unknowns))
-    weighted = weight * left
+    beyond = float((np.abs(residual) ** 2).sum() - NOISE_TRUSTED * (1 / weight**2).sum())
+    hidden = float((np.abs(residual) ** 2).sum() - _lower_noise_bound(1 / weight**2, unknowns))
+    weighted = weight * residual
     power = float((np.abs(weighted) ** 2).sum())
     smooth = None
     if power > NOISE_TRUSTED * weighted.size and len(weighted) > 1:

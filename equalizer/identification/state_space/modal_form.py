@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +65,8 @@ def modal_form(A: FloatArray, C: FloatArray) -> ModalForm:
 
 
 def from_poles(poles: ComplexArray, shapes: ComplexArray) -> ModalForm:
-    """poles: (n,), conjugates included; shapes: (p, n), the outputs' share in each."""
+    """The real modal form of given poles and output shapes. poles: (n,), conjugates included; shapes: (p, n), the
+    outputs' share in each."""
     upper = np.flatnonzero(poles.imag > 0)
     real = np.flatnonzero(poles.imag == 0)
     real = real[np.argsort(poles[real].real)]

@@ -11,8 +11,7 @@ import numpy as np
 from equalizer.identification.state_space.modal_form import ModalForm
 from equalizer.identification.state_space.stable_poles import Radius, stabilise_blocks
 from equalizer.identification.state_space.weighted_lines import WeightedLines
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 RANK = 1e-11
 """Directions weaker than this share of the strongest are left at zero rather than filled with noise."""

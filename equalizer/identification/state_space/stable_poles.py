@@ -5,8 +5,7 @@ A pole at 0.99999 does not change a fit over 5 to 35 Hz, but makes simulations d
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 Radius = float | FloatArray
 """Largest radius of all pairs of poles, or one per pair."""

@@ -12,8 +12,7 @@ import numpy as np
 from equalizer.identification.state_space.modal_form import ModalForm, from_poles
 from equalizer.identification.state_space.stable_poles import stabilise_poles
 from equalizer.identification.state_space.weighted_lines import WeightedLines
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 LEAST_NOISE = 1e-9
 """Smallest noise relative to the strongest entry, so that noise-free data have finite weights."""

@@ -111,7 +111,8 @@ class BandedEqualizer:
         return 1e3 * self.latency_samples / self.middle.sample_rate_hz
 
     def play(self, wanted: FloatArray, cap: CapPolicy | None = None) -> BandedForces:
-        """wanted: (n, p), m/s². Raises ForceLimitError or TrackingError where the cap cannot be held."""
+        """Forces of all three bands for a wanted acceleration. wanted: (n, p), m/s². Raises ForceLimitError or
+        TrackingError where the cap cannot be held."""
         bands = self.split.split(self._pad(wanted))
         low, motion = self._low_forces(bands.low)
         problem = make_tracking_problem(self.middle, self.weights)

@@ -13,8 +13,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
 """Weight of |force|² beside |G|²: a smaller one amplifies noise at antiresonances, with a larger one weak lines fall

@@ -45,7 +45,8 @@ class LowBandForces:
 
 
 def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
-    """wanted: (N, m), m/s², known beforehand and quiet at both ends.
+    """Plan the slow motion of the low band by a zero-phase filter. wanted: (N, m), m/s², known beforehand and quiet at
+    both ends.
 
     Two-sided, so that there is no phase error: x = a / (s² - w²), an exponential kernel that decays both ways. Of the
     wanted acceleration f² / (f² + corner²) is played.
@@ -60,8 +61,8 @@ def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CO
 
 
 def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
-    """wanted: (N, m), m/s², from rest at the first row, as after a contact. x = a / (s + w)²: it leads by
-    2 atan(corner / f)."""
+    """Plan the slow motion of the low band by a causal filter. wanted: (N, m), m/s², from rest at the first row, as
+    after a contact. x = a / (s + w)²: it leads by 2 atan(corner / f)."""
     a, corner = np.asarray(wanted, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
     c = 2 * sample_rate_hz
     integral = np.array([1.0, 1.0]) / (c + corner), np.array([1.0, (corner - c) / (c + corner)])

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 WORST_CONDITION = 1e6
 """Largest condition number of the response that is inverted."""

@@ -12,14 +12,14 @@ import numpy as np
 from equalizer.laws.evaluate import evaluate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
-from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
-from equalizer.tracking.compensation.known_physics import (
+from equalizer.tracking.compensation.effect_compensation import (
     along_axes,
     axes_of,
     axis_gains,
     force_law,
     slip_speed,
 )
+from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
 from equalizer.tracking.feedforward.planned_motion import planned_motion
 
 HIGHEST_SHARE = 3.0

@@ -12,8 +12,7 @@ from math import comb
 import numpy as np
 from scipy.signal import firwin, freqz, kaiser_beta, lfilter, oaconvolve
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 STOPBAND_DB = 60.0
 """Attenuation of the filters outside their band."""
@@ -89,8 +88,8 @@ class LinearPhaseSplit:
         taps = 2 * self.latency_samples + 1
         everything, nothing = np.zeros(taps), np.zeros(taps)
         everything[self.latency_samples] = 1.0
-        low = nothing if self.edges.low_hz is None else self._below(self.edges.low_hz)
-        below_high = everything if self.edges.high_hz is None else self._below(self.edges.high_hz)
+        low = nothing if self.edges.low_hz is None else self._low_pass_filter(self.edges.low_hz)
+        below_high = everything if self.edges.high_hz is None else self._low_pass_filter(self.edges.high_hz)
         return np.stack([low, below_high - low, everything - below_high])
 
     def split(self, wanted: FloatArray) -> Bands:
@@ -107,7 +106,7 @@ class LinearPhaseSplit:
         parts = [freqz(taps, worN=frequency_hz, fs=self.sample_rate_hz)[1] for taps in self.filters]
         return np.asarray(np.stack(parts, axis=1) * turned[:, None])
 
-    def _below(self, edge_hz: float) -> FloatArray:
+    def _low_pass_filter(self, edge_hz: float) -> FloatArray:
         window = ("kaiser", kaiser_beta(STOPBAND_DB))
         taps = firwin(2 * self.latency_samples + 1, edge_hz, window=window, fs=self.sample_rate_hz)
         return np.asarray(taps)
@@ -143,9 +142,9 @@ class CausalSplit:
     def split(self, wanted: FloatArray) -> Bands:
         """wanted: (N, channels), from rest."""
         x = np.asarray(wanted, dtype=np.float64)
-        high = self._above(self.edges.high_hz, x) if self.edges.high_hz else np.zeros_like(x)
+        high = self._high_pass(self.edges.high_hz, x) if self.edges.high_hz else np.zeros_like(x)
         rest = x - high
-        low = rest - self._above(self.edges.low_hz, rest) if self.edges.low_hz else np.zeros_like(x)
+        low = rest - self._high_pass(self.edges.low_hz, rest) if self.edges.low_hz else np.zeros_like(x)
         return Bands(low, rest - low, high, 0)
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
@@ -165,7 +164,7 @@ class CausalSplit:
         lines = np.geomspace(0.05, 0.499 * self.sample_rate_hz, 2000)
         return float(np.abs(self.response(lines)).max())
 
-    def _above(self, edge_hz: float, x: FloatArray) -> FloatArray:
+    def _high_pass(self, edge_hz: float, x: FloatArray) -> FloatArray:
         pole = self.one_pole(edge_hz)
         total = np.zeros_like(x)
         for power in range((self.order + 1) // 2, self.order + 1):

@@ -11,8 +11,7 @@ import numpy as np
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, inverse_response, regularised_inverse
 
 
@@ -27,7 +26,7 @@ class Inverse:
     """Multiply-adds per sample for all channels."""
 
 
-def no_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
+def no_equalization(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
     """No equalization: the wanted number in m/s² is commanded in N."""
     return Inverse("nothing", _constant_response(np.eye(*model.D.shape[::-1]), frequency_hz), 0)
 

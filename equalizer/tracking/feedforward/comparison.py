@@ -7,13 +7,12 @@ import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.baselines import (
     Inverse,
     acceleration_matching,
     identified_inverse,
-    no_inverse,
+    no_equalization,
     raw_estimate,
     rigid_body,
     static_gain,
@@ -37,7 +36,7 @@ def baseline_inverses(
 ) -> tuple[Inverse, ...]:
     """All baseline inverses from the data of one place, the identified model's last."""
     return (
-        no_inverse(model, frequency_hz),
+        no_equalization(model, frequency_hz),
         static_gain(model, frequency_hz),
         acceleration_matching(model, frequency_hz),
         rigid_body(model, frequency_hz),

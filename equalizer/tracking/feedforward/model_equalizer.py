@@ -9,7 +9,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, periodic_command
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
-from equalizer.tracking.lqr.lqr import StoredGains, periodic_state, ringing_weight, stored_gains, track
+from equalizer.tracking.lqr.lqr import StoredGains, free_decay_weight, periodic_state, stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 
@@ -64,4 +64,4 @@ def _force_properties(loop: Signal) -> tuple[float, str | tuple[str, ...], str |
 @lru_cache(maxsize=8)
 def _onset_gains(model: IdentifiedModel, weight: float, samples: int) -> StoredGains:
     problem = make_tracking_problem(model, TrackingWeights(weight))
-    return stored_gains(problem, samples, ringing_weight(problem))
+    return stored_gains(problem, samples, free_decay_weight(problem))

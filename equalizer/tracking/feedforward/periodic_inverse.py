@@ -4,8 +4,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.signal import ComplexArray, FloatArray, Signal
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
 WEIGHT = 1e-4
@@ -61,7 +60,8 @@ def periodic_command(
 
 
 def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
-    """Raises OutsideBandError for frequencies that the model does not cover."""
+    """Check that a model covers the frequencies of a signal. Raises OutsideBandError for frequencies that the model
+    does not cover."""
     low, high = model.band_hz
     outside = [f for f in np.atleast_1d(frequency_hz) if not low * (1 - 1e-9) <= f <= high * (1 + 1e-9)]
     if outside:
@@ -73,7 +73,8 @@ def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
 
 
 def check_wanted(model: IdentifiedModel, wanted: Signal) -> None:
-    """Raises ValueError for a signal whose rate, channels or units are not the model's."""
+    """Check a wanted signal against the model. Raises ValueError for a signal whose rate, channels or units are not the
+    model's."""
     if wanted.sample_rate_hz != model.sample_rate_hz:
         raise ValueError(
             f"the model runs at {model.sample_rate_hz:g} Hz, not at {wanted.sample_rate_hz:g} Hz; "

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
+from equalizer.signals.signal import ComplexArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,8 @@ class Quality:
 
 
 def quality(delivered: ComplexArray) -> Quality:
-    """delivered: (lines, p, p), delivered over wanted, column by column the wanted axis; perfect is the identity."""
+    """Flatness, coupling and direction error of an equalized response. delivered: (lines, p, p), delivered over wanted,
+    column by column the wanted axis; perfect is the identity."""
     along = np.abs(np.einsum("lii->li", delivered))
     off = np.abs(delivered - np.einsum("li,ij->lij", np.einsum("lii->li", delivered), np.eye(delivered.shape[1])))
     with np.errstate(divide="ignore"):

@@ -91,7 +91,7 @@ def trajectory_csv(trajectory: Trajectory) -> str:
 
 
 def require_rate(trajectory: Trajectory, rate_hz: float) -> None:
-    """Raises TableError where the rows are not at the model's rate."""
+    """Require the model's sample rate. Raises TableError where the rows are not at the model's rate."""
     found = trajectory.signal.sample_rate_hz
     if abs(found - rate_hz) > RATE_TOLERANCE * rate_hz:
         raise TableError((f"the rows are at {found:g} Hz, but the model is at {rate_hz:g} Hz; resample them to it",))

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

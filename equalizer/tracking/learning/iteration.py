@@ -20,7 +20,7 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_part import band_part
 
 Invert = Callable[[FloatArray], FloatArray]
-"""From wanted accelerations (N, p) to forces (N, m); linear, one row to one."""
+"""Linear inverse of the device: wanted accelerations (N, p) to forces (N, m), row by row."""
 
 SURE = 3.0
 """Standard deviations above the noise floor from which a residual is more than noise."""
@@ -140,8 +140,8 @@ class IterationState:
 
 
 def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationState:
-    """first: (N, m), forces to begin with; None = the model's inverse of what is wanted. Raises ValueError where the
-    first forces are above the cap, or what is wanted has nothing in the band."""
+    """The state before the first play. first: (N, m), forces to begin with; None = the model's inverse of what is
+    wanted. Raises ValueError where the first forces are above the cap, or what is wanted has nothing in the band."""
     if repetition.level == 0:
         low, high = repetition.band_hz
         raise ValueError(
@@ -158,8 +158,9 @@ def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationS
 
 
 def next_forces(state: IterationState, measured: FloatArray) -> IterationState:
-    """measured: (N, p), the answer to `state.forces`. Raises ValueError on another shape, on values that are not
-    finite, and where the verdict was to stop."""
+    """The state after a play: forces corrected by the measured error, and whether to go on. measured: (N, p), the
+    answer to `state.forces`. Raises ValueError on another shape, on values that are not finite, and where the verdict
+    was to stop."""
     repetition = state.repetition
     if state.verdict is not Verdict.CONTINUE:
         raise ValueError(f"this iteration is over: {state.verdict.value}")

@@ -13,7 +13,7 @@ from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 InverseOfLength = Callable[[int], Invert]
-"""From the number of rows to the operator, which is prepared once per length."""
+"""Makes the inverse operator for records of a number of rows; prepared once per length."""
 
 
 def inverse_operator(model: IdentifiedModel, weight: float = 1e-3) -> InverseOfLength:

@@ -49,7 +49,8 @@ def force_peaks(forces: FloatArray, cap_n: float) -> Peaks:
 
 
 def require_under_cap(forces: FloatArray, cap_n: float, sample_rate_hz: float) -> Peaks:
-    """Raises ForceLimitError where a row of forces, (N, m), is longer than the cap."""
+    """Require forces under the cap, and return their peaks. Raises ForceLimitError where a row of forces, (N, m), is
+    longer than the cap."""
     peaks = force_peaks(forces, cap_n)
     if not peaks.fits:
         # Rounded down, so that the printed factor still fits.

@@ -106,7 +106,7 @@ def periodic_state(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(around, x))
 
 
-def ringing_weight(problem: TrackingProblem) -> FloatArray:
+def free_decay_weight(problem: TrackingProblem) -> FloatArray:
     """(n, n): the observability Gramian as terminal weight, which counts the free decay after the end: a final state
     that is off by d, with forces that go on as intended (none after a transient, the loop after a fade-in), costs
     d' P_N d in output deviations. Raises TrackingError on an unstable model."""

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.lqr import lqr_kernel
 from equalizer.tracking.lqr.lqr import TrackResult
 from equalizer.tracking.lqr.riccati import stationary_gains

@@ -43,13 +43,15 @@ class RotationBasis:
 
 
 def rotation_basis(gains: StoredGains, trajectory: FloatArray) -> RotationBasis:
-    """trajectory: (N, p), before it is rotated. p * p solutions."""
+    """Solutions from which those of every rotation of a trajectory are combined. trajectory: (N, p), before it is
+    rotated. p * p solutions."""
     p = gains.problem.outputs
     return _solve_basis(gains, every_rotation(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
 def normal_basis(gains: StoredGains, recording: FloatArray) -> RotationBasis:
-    """recording: (N,), to be played along a normal. p solutions."""
+    """Solutions from which those of every normal are combined. recording: (N,), to be played along a normal. p
+    solutions."""
     p = gains.problem.outputs
     return _solve_basis(gains, every_normal(recording, p), (p,))
 

@@ -12,8 +12,7 @@ from scipy.optimize import least_squares
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 BEYOND = 0.12
 """A resonance may lie this far outside the band, relative: its slope is inside."""

@@ -3,8 +3,7 @@
 import numpy as np
 
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.convergence import Convergence, convergence
 from equalizer.tracking.workspace.feedforward_at_place import used_models

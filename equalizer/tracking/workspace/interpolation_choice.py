@@ -8,8 +8,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT
 from equalizer.tracking.feedforward.quality import Quality, quality
 from equalizer.tracking.workspace.blended_inverse import blend_at

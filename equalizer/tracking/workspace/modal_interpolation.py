@@ -12,8 +12,7 @@ from scipy.linalg import block_diag
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.workspace.band_modes import BandLines, BandMode, band_lines, band_modes
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError, match_modes
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
@@ -56,7 +55,8 @@ class ModalInterpolation:
 
 
 def modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
-    """Raises ModesDoNotMatchError where it is doubtful which resonances of neighbouring models are the same."""
+    """Match the resonances of neighbouring models for an interpolation. Raises ModesDoNotMatchError where it is
+    doubtful which resonances of neighbouring models are the same."""
     band_hz = workspace.band_hz
     modes = [band_modes(model, band_hz) for model in workspace.models]
     tracks = _track_modes(workspace, modes)

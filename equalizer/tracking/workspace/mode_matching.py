@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.workspace.band_modes import BandMode
 
 FREQUENCY_SCALE = 0.3

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.signals.lockin import ComplexArray
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, inverse_response
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from equalizer.tracking.workspace.workspace_models import Place

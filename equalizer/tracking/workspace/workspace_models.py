@@ -20,7 +20,8 @@ class WorkspaceError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorkspaceModels:
-    """Raises WorkspaceError where models differ in rate, channels or units, share no band, or lack a place.
+    """Models of one device at several places of its workspace. Raises WorkspaceError where models differ in rate,
+    channels or units, share no band, or lack a place.
 
     A single model needs no place: it is used everywhere.
     """

@@ -11,6 +11,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 GRAVITY_MPS2 = 9.80665
+"""Standard gravity (m/s^2)."""
 
 POSITIONS = ("+x up", "-x up", "+y up", "-y up", "+z up", "-z up")
 UP = np.kron(np.eye(3), np.array([[1.0], [-1.0]]))
@@ -52,7 +53,8 @@ class Calibration:
 
 
 def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
-    """positions: raw samples (n, 3) at rest in each of `POSITIONS`.
+    """Bias, sensitivity matrix and noise by least squares from six positions under gravity. positions: raw samples (n,
+    3) at rest in each of `POSITIONS`.
 
     Raises ValueError that says which position does not fit, or that a channel hardly answers.
     """

@@ -34,7 +34,8 @@ class ClockFit:
 
 
 def fit_clock(device_s: FloatArray, arrived_s: FloatArray) -> ClockFit:
-    """device_s (n,), rising: when samples were taken, by the device; arrived_s (n,): when they came, by the host.
+    """Fit the device's clock to the host's: a line through the earliest arrivals. device_s (n,), rising: when samples
+    were taken, by the device; arrived_s (n,): when they came, by the host.
 
     Raises ValueError for fewer than two samples, or device times that do not rise.
     """

@@ -40,7 +40,7 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stretch:
+class ArrivedSamples:
     """What arrived within a time."""
 
     device_s: FloatArray
@@ -88,7 +88,7 @@ class History:
             counted = arrivals[-1, 3:] - arrivals[before, 3:]
         return Counts(*(int(count) for count in counted))
 
-    def stretch(self, from_s: float, until_s: float) -> Stretch:
+    def stretch(self, from_s: float, until_s: float) -> ArrivedSamples:
         """Arrivals from from_s up to until_s, with all of their samples."""
         with self._lock:
             arrivals = self._arrivals.rows
@@ -96,7 +96,9 @@ class History:
             begin = int(arrivals[first - 1, 1]) - self._taken if first else 0
             stop = int(arrivals[end - 1, 1]) - self._taken if end else 0
             samples, arrivals = self._samples.rows[begin:stop].copy(), arrivals[first:end].copy()
-        return Stretch(samples[:, 0], samples[:, 1], samples[:, 2:], arrivals[:, 2], arrivals[:, 6], arrivals[:, 0])
+        return ArrivedSamples(
+            samples[:, 0], samples[:, 1], samples[:, 2:], arrivals[:, 2], arrivals[:, 6], arrivals[:, 0]
+        )
 
     def _forget(self, before_s: float) -> None:
         """Now and then, a tenth at a time, but for the last arrival before: it says where the next one begins."""

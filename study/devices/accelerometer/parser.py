@@ -22,9 +22,11 @@ from study.devices.accelerometer.samples import Counts, Samples
 Bytes = npt.NDArray[np.uint8]
 
 SIZE = 16
+"""Bytes of a packet."""
 SYNC = bytes((0xA5, 0x5A))
 CHECKED = slice(2, 14)
 POLYNOMIAL, START = 0x1021, 0xFFFF
+"""CRC-16-CCITT: generator polynomial and initial value."""
 
 LAYOUT = np.dtype(
     [("sync", "<u2"), ("sequence", "<u2"), ("time_us", "<u4"), ("raw", "<u2", (3,)), ("crc", "<u2")]

@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.clock_fit import ClockFit, fit_clock
-from study.devices.accelerometer.history import Stretch
+from study.devices.accelerometer.history import ArrivedSamples
 
 CORNER = 0.42
 """Frequency of the low-pass's -6 dB, relative to the lower of both rates."""
@@ -38,7 +38,7 @@ AT_ONCE = 4096
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class PlacedSamples:
     """Sensor values resampled to the ticks of the loop."""
 
     values: FloatArray
@@ -47,8 +47,9 @@ class Placed:
     """Fit of the clock to which most samples belong; None where none could be fitted."""
 
 
-def place(stretch: Stretch, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> Placed:
-    """values: (n, channels) of the samples; tick_s: (k,), rising, when the ticks were due, rate_hz apart."""
+def place(stretch: ArrivedSamples, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
+    """Resample samples to the ticks of the loop. values: (n, channels) of the samples; tick_s: (k,), rising, when the
+    ticks were due, rate_hz apart."""
     host_s = np.full(len(stretch.device_s), np.nan)
     best: ClockFit | None = None
     most = 0
@@ -63,7 +64,7 @@ def place(stretch: Stretch, values: FloatArray, tick_s: FloatArray, rate_hz: flo
             best, most = fit, int(samples.sum())
     known = np.isfinite(host_s)
     order = np.argsort(host_s[known], kind="stable")
-    return Placed(resample(host_s[known][order], values[known][order], tick_s, rate_hz), best)
+    return PlacedSamples(resample(host_s[known][order], values[known][order], tick_s, rate_hz), best)
 
 
 def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_hz: float) -> FloatArray:
@@ -74,7 +75,7 @@ def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_
     period_s = float(np.median(np.diff(sample_s)))
     lower_hz = min(rate_hz, 1.0 / period_s)
     half_s = HALF_PERIODS / lower_hz
-    whole = _whole(sample_s, tick_s, half_s, LONGEST_GAP / lower_hz)
+    whole = _is_without_gap(sample_s, tick_s, half_s, LONGEST_GAP / lower_hz)
     # Samples lie closer where the board was late: each counts for the time that it stands for.
     stands_for_s = np.gradient(sample_s)
     window = np.kaiser(4097, KAISER_BETA)[2048:]
@@ -91,7 +92,7 @@ def resample(sample_s: FloatArray, values: FloatArray, tick_s: FloatArray, rate_
     return placed
 
 
-def _whole(sample_s: FloatArray, tick_s: FloatArray, half_s: float, longest_s: float) -> np.ndarray:
+def _is_without_gap(sample_s: FloatArray, tick_s: FloatArray, half_s: float, longest_s: float) -> np.ndarray:
     """(k,), whether the samples about each tick are without a gap."""
     inside = (tick_s - half_s >= sample_s[0] - longest_s) & (tick_s + half_s <= sample_s[-1] + longest_s)
     gaps = np.flatnonzero(np.diff(sample_s) > longest_s)

@@ -12,14 +12,14 @@ from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.clock_fit import ClockFit
 from study.devices.accelerometer.history import History
 from study.devices.accelerometer.newest_sample import NewestSample
-from study.devices.accelerometer.placement import HALF_PERIODS, Placed, place
+from study.devices.accelerometer.placement import HALF_PERIODS, PlacedSamples, place
 from study.devices.accelerometer.samples import Counts, Source
-from study.devices.rig import Sensed
+from study.devices.rig import SensedAcceleration
 from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
 
 ZEROING_S = 0.5
-"""At rest, when it is opened: gravity, and the drift of the bias since the calibration."""
+"""Time at rest when it is opened (s), whose mean is subtracted: gravity, and the bias's drift since calibration."""
 
 FITTED_S = 120.0
 """Before a recording, and the recording: to their arrivals the clock is fitted. Long enough for 1 ppm, and short enough
@@ -30,7 +30,8 @@ LATENESS_S = 0.05
 
 
 class Accelerometer:
-    """raw_range: the lowest and the highest raw value that are within the sensor's range."""
+    """An accelerometer with its own clock: the newest sample at any time, and resampled ones after a recording.
+    raw_range: the lowest and the highest raw value that are within the sensor's range."""
 
     def __init__(self, source: Source, calibration: Calibration, raw_range: tuple[float, float]) -> None:
         self._source, self._calibration, self._range = source, calibration, raw_range
@@ -63,13 +64,13 @@ class Accelerometer:
     def latest(self) -> tuple[FloatArray, bool]:
         return self._newest.fresh(time.monotonic())
 
-    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed:
-        """Read the sensor apart from the position: the port of `study.devices.rig.SensesApart`."""
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:
+        """Read the sensor apart from the position: the port of `study.devices.rig.OwnClockSensor`."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
-        placed = self._placed(tick_s, rate_hz) if len(tick_s) else Placed(np.zeros((0, 3)), None)
+        placed = self._resample_to_ticks(tick_s, rate_hz) if len(tick_s) else PlacedSamples(np.zeros((0, 3)), None)
         counts = self._history.counted(since_s)
-        return Sensed(placed.values, _health(counts, placed.values, placed.fit))
+        return SensedAcceleration(placed.values, _health(counts, placed.values, placed.fit))
 
     def rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
         """What arrived in the last seconds at rest, the standard deviation of each axis (3,) in m/s², and samples per
@@ -77,7 +78,7 @@ class Accelerometer:
         now_s = time.monotonic()
         stretch = self._history.stretch(now_s - seconds, now_s)
         noise = self._calibration.acceleration(stretch.raw).std(axis=0) if len(stretch.raw) else np.full(3, np.nan)
-        fit = self._placed(np.array([now_s]), 1000.0).fit
+        fit = self._resample_to_ticks(np.array([now_s]), 1000.0).fit
         return _health(self._history.counted(now_s - seconds), np.zeros((0, 3)), fit), noise, len(stretch.raw) / seconds
 
     def close(self) -> None:
@@ -86,7 +87,7 @@ class Accelerometer:
         with contextlib.suppress(Exception):
             self._source.close()
 
-    def _placed(self, tick_s: FloatArray, rate_hz: float) -> Placed:
+    def _resample_to_ticks(self, tick_s: FloatArray, rate_hz: float) -> PlacedSamples:
         stretch = self._history.stretch(tick_s[0] - FITTED_S, time.monotonic())
         values = self._calibration.acceleration(stretch.raw) - self._rest_mps2
         return place(stretch, values, tick_s, rate_hz)

@@ -44,7 +44,7 @@ class SerialSource:
 
 
 def open_serial(path: str, baud: int) -> SerialSource:
-    """Raises `DeviceError`."""
+    """Open a board on a serial line. Raises `DeviceError`."""
     try:
         import serial
     except ImportError as error:

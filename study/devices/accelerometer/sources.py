@@ -25,16 +25,18 @@ PAUSE_S = 0.01
 """Between two reads: so much comes at once."""
 
 DUMMY_V = -9999.0
-"""In the place of a scan that a LabJack lost."""
+"""Value in place of a scan that a LabJack lost."""
 
 
 def open_source(port: str, baud: int) -> Source:
-    """Raises `DeviceError`."""
+    """Open the source of samples at a port, by its name. Raises `DeviceError`."""
     if port.startswith(NI):
-        return _opened(lambda: NiSource(port.removeprefix(NI)), port, "nidaqmx", "ni", "NI-DAQmx from ni.com")
+        return _open_source(lambda: NiSource(port.removeprefix(NI)), port, "nidaqmx", "ni", "NI-DAQmx from ni.com")
     if port.startswith(LABJACK):
         name = port.removeprefix(LABJACK)
-        return _opened(lambda: LabJackSource(name), port, "labjack-ljm", "labjack", "the LJM library from labjack.com")
+        return _open_source(
+            lambda: LabJackSource(name), port, "labjack-ljm", "labjack", "the LJM library from labjack.com"
+        )
     return open_serial(port, baud)
 
 
@@ -63,7 +65,7 @@ class ScanCounter:
 
 
 class NiSource:
-    """Raises what nidaqmx raises."""
+    """A data-acquisition device of National Instruments. Raises what nidaqmx raises."""
 
     def __init__(self, device: str) -> None:
         nidaqmx, constants = import_module("nidaqmx"), import_module("nidaqmx.constants")
@@ -93,7 +95,7 @@ class NiSource:
 
 
 class LabJackSource:
-    """Raises what labjack-ljm raises."""
+    """A LabJack. Raises what labjack-ljm raises."""
 
     def __init__(self, identifier: str) -> None:
         self._ljm: Any = import_module("labjack.ljm")
@@ -122,7 +124,7 @@ class LabJackSource:
             self._ljm.close(self._handle)
 
 
-def _opened(opener: Callable[[], Source], port: str, package: str, extra: str, driver: str) -> Source:
+def _open_source(opener: Callable[[], Source], port: str, package: str, extra: str, driver: str) -> Source:
     try:
         return opener()
     except ImportError as error:

@@ -25,9 +25,9 @@ from study.devices.rig import READING_SIZE
     # Of real time: when the stimulus began and when the loop turned last, s; ticks run; when the last one was due, s.
     STARTED_S, LAST_S, RUN, DUE_S, RATE_HZ, LONGEST_GAP_S,
     # Readings so far of this call, as they stand in `seen`.
-    SEEN, COURSE_SIZE,
+    SEEN, LOOP_STATE_SIZE,
 ) = range(13)  # fmt: skip
-"""Cells of `course`. STARTED_S to LONGEST_GAP_S belong to `realtime_drive`."""
+"""Cells of `loop_state`. STARTED_S to LONGEST_GAP_S belong to `realtime_drive`."""
 
 GOES_ON, OVER, GAP = 0, -1, -2
 """What a call answers, or the rig's own code above zero. OVER: that tick was the last, or the rig is gone. GAP: none
@@ -56,11 +56,11 @@ _ATTEND = types.int64(SENSE, WRITE, TICK, PUBLISH, MISS, _RIG, _GOVERNOR, _COURS
 
 @part
 def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
-    sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, course: Any
+    sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
     calls, cells, samples = rig
     state, settings, loop, buffer, force, ring, _nothing = governor
-    flags, reading, seen = course
+    flags, reading, seen = loop_state
     code = sense(calls, cells, samples, reading)
     if code != 0:
         return int(code)
@@ -103,16 +103,16 @@ def _wait_for_tick(calls: Any, flags: FloatArray) -> float:
 
 
 @part
-def _is_called_away(governor: Any, course: Any) -> bool:
-    flags = course[0]
+def _is_called_away(governor: Any, loop_state: Any) -> bool:
+    flags = loop_state[0]
     return bool(flags[WANTED] != 0.0 or flags[GONE] != 0.0 or governor[0][PHASE] == STILL)
 
 
 @part
 def _attend_tick(  # noqa: PLR0913 - as above
-    sense: Any, write: Any, govern: Any, publish: Any, miss: Any, rig: Any, governor: Any, course: Any
+    sense: Any, write: Any, govern: Any, publish: Any, miss: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
-    calls, flags, state, code = rig[0], course[0], governor[0], GOES_ON
+    calls, flags, state, code = rig[0], loop_state[0], governor[0], GOES_ON
     now = _wait_for_tick(calls, flags)
     if flags[GONE] != 0.0 or state[PHASE] == STILL:
         return OVER
@@ -124,7 +124,7 @@ def _attend_tick(  # noqa: PLR0913 - as above
     if late > 0:
         miss(state, governor[3], governor[6], late)
     if late >= 0:
-        code = _tick(sense, write, govern, publish, rig, governor, course)
+        code = _tick(sense, write, govern, publish, rig, governor, loop_state)
     flags[RUN] = due
     if code <= GOES_ON:
         done = now_s(calls)
@@ -136,20 +136,20 @@ def _attend_tick(  # noqa: PLR0913 - as above
 def _entry_points(sources: int) -> tuple[Any, Any]:
     @njit(_RUN_DUE, cache=True, nogil=True, error_model="numpy")
     def run_due(  # noqa: PLR0913 - compiled code takes function pointers one by one
-        sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, course: Any, ticks: int
+        sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any, ticks: int
     ) -> int:
         """Run at most `ticks` ticks that are due, fewer if all is over before. Returns their number."""
         _ = sources
         code = GOES_ON
         for _k in range(ticks):
-            code = _tick(sense, write, govern, publish, rig, governor, course)
-            if code != GOES_ON or course[0][GONE] != 0.0:
+            code = _tick(sense, write, govern, publish, rig, governor, loop_state)
+            if code != GOES_ON or loop_state[0][GONE] != 0.0:
                 break
         return code
 
     @njit(_ATTEND, cache=True, nogil=True, error_model="numpy")
     def attend(  # noqa: PLR0913 - as above
-        sense: Any, write: Any, govern: Any, publish: Any, miss: Any, rig: Any, governor: Any, course: Any
+        sense: Any, write: Any, govern: Any, publish: Any, miss: Any, rig: Any, governor: Any, loop_state: Any
     ) -> int:
         """Ticks as they become due, until all is over, one fails, or the thread is wanted. Only where
         `study.devices.native.SLEEP` is there.
@@ -158,8 +158,8 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
         """
         _ = sources
         code = GOES_ON
-        while code == GOES_ON and not _is_called_away(governor, course):
-            code = _attend_tick(sense, write, govern, publish, miss, rig, governor, course)
+        while code == GOES_ON and not _is_called_away(governor, loop_state):
+            code = _attend_tick(sense, write, govern, publish, miss, rig, governor, loop_state)
         return code
 
     return run_due, attend

@@ -8,13 +8,13 @@ from study.devices.drive.runner import Part
 from study.devices.governor import govern
 from study.devices.governor.governor import Governor
 from study.devices.native import SLEEP
-from study.devices.rig import READING_SIZE, Halves, Rig
+from study.devices.rig import READING_SIZE, CompiledIo, Rig
 
 
-def halves_of(rig: Rig) -> Halves | None:
+def halves_of(rig: Rig) -> CompiledIo | None:
     """Compiled halves of a tick of this rig; None where the rig has none."""
     halves = getattr(rig, "halves", None)
-    return halves if isinstance(halves, Halves) else None
+    return halves if isinstance(halves, CompiledIo) else None
 
 
 TICK_PARTS = Part(govern.tick, TICK), Part(govern.publish, PUBLISH)
@@ -25,14 +25,14 @@ class CompiledTicks:
     """Runs the ticks of a rig by the compiled loop of `compiled_drive`, and gives its newest reading. The loop is
     compiled when the object is made."""
 
-    def __init__(self, halves: Halves, governor: Governor, course: FloatArray) -> None:
+    def __init__(self, halves: CompiledIo, governor: Governor, loop_state: FloatArray) -> None:
         self._halves = halves
         self._governor = governor
         self._parts = Part(halves.sense, SENSE), Part(halves.write, WRITE), *TICK_PARTS
         self._rig = halves.calls, halves.cells, halves.samples
         self._seen: FloatArray = np.zeros((SEEN_ROWS, READING_SIZE))
-        self._course = course, np.zeros(READING_SIZE), self._seen
-        self._flags = course
+        self._loop_state = loop_state, np.zeros(READING_SIZE), self._seen
+        self._flags = loop_state
         self._running = False
         self.error = halves.error
         self.run(0)  # compiled now, not when a stimulus is due
@@ -44,14 +44,14 @@ class CompiledTicks:
     def run(self, ticks: int) -> int:
         self._flags[SEEN], self._running = 0.0, True
         try:
-            return int(run_due(*self._parts, self._rig, self._arrays(), self._course, ticks))
+            return int(run_due(*self._parts, self._rig, self._arrays(), self._loop_state, ticks))
         finally:
             self._running = False
 
     def attend(self) -> int:
         self._flags[SEEN], self._running = 0.0, True
         try:
-            return int(attend(*self._parts, MISSED, self._rig, self._arrays(), self._course))
+            return int(attend(*self._parts, MISSED, self._rig, self._arrays(), self._loop_state))
         finally:
             self._running = False
 

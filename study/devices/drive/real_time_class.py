@@ -51,7 +51,7 @@ LINUX_ADVICE = (
 
 
 @dataclass(frozen=True, slots=True)
-class Granted:
+class GrantedRights:
     """What the system granted."""
 
     scheduled: bool
@@ -70,7 +70,7 @@ class _Users:
         self._undos: list[Callable[[], object]] = []
         self._switch_s = 0.0
 
-    def enter(self) -> Granted:
+    def enter(self) -> GrantedRights:
         with self._lock:
             granted, undo = _request_class()  # by each user: the class is a thread's, and memory was mapped since
             if self._count == 0:
@@ -93,7 +93,7 @@ _USERS = _Users()
 
 
 @contextlib.contextmanager
-def real_time_class() -> Iterator[Granted]:
+def real_time_class() -> Iterator[GrantedRights]:
     """Give the calling thread the real-time class until it ends, and lock the program's memory until the last user
     ends. Raises nothing."""
     granted = _USERS.enter()
@@ -105,7 +105,7 @@ def real_time_class() -> Iterator[Granted]:
 
 def real_time_finding() -> DeviceFinding:
     """Finding on what the system grants to this account, tried in a separate thread."""
-    found: list[Granted] = []
+    found: list[GrantedRights] = []
 
     def ask() -> None:
         with real_time_class() as granted:
@@ -134,7 +134,7 @@ def _may_starve_others() -> bool:
         return False
 
 
-def _request_class() -> tuple[Granted, Callable[[], None]]:
+def _request_class() -> tuple[GrantedRights, Callable[[], None]]:
     """Request the class of the calling thread and the memory lock. Also returns the function that undoes what does not
     end with the thread."""
     if platform.system() == "Linux":
@@ -142,10 +142,10 @@ def _request_class() -> tuple[Granted, Callable[[], None]]:
     windows = getattr(ctypes, "windll", None)
     if windows is not None:
         return _of_windows(windows)
-    return Granted(False, False, "This system offers none: close other programs."), lambda: None
+    return GrantedRights(False, False, "This system offers none: close other programs."), lambda: None
 
 
-def _of_linux(library: Any) -> tuple[Granted, Callable[[], None]]:
+def _of_linux(library: Any) -> tuple[GrantedRights, Callable[[], None]]:
     try:
         # A program that is started from here must not inherit it.
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
@@ -158,7 +158,7 @@ def _of_linux(library: Any) -> tuple[Granted, Callable[[], None]]:
     except AttributeError:
         locked = False
     advice = "" if scheduled and locked else LINUX_ADVICE
-    return Granted(scheduled, locked, advice), library.munlockall if locked else lambda: None
+    return GrantedRights(scheduled, locked, advice), library.munlockall if locked else lambda: None
 
 
 def _memory_without_limit() -> bool:
@@ -167,7 +167,7 @@ def _memory_without_limit() -> bool:
     return resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
 
 
-def _of_windows(windows: Any) -> tuple[Granted, Callable[[], None]]:
+def _of_windows(windows: Any) -> tuple[GrantedRights, Callable[[], None]]:
     """Sleeps of 1 ms instead of 16, and the thread's priority. Its memory is locked by no call that a program has."""
     fine_sleep = windows.winmm.timeBeginPeriod(1) == 0
     kernel = windows.kernel32
@@ -175,4 +175,4 @@ def _of_windows(windows: Any) -> tuple[Granted, Callable[[], None]]:
     scheduled = bool(kernel.SetThreadPriority(ctypes.c_void_p(kernel.GetCurrentThread()), TIME_CRITICAL))
     advice = "Windows locks no program's memory: close other programs, and leave memory free."
     undo = (lambda: windows.winmm.timeEndPeriod(1)) if fine_sleep else (lambda: None)
-    return Granted(scheduled and fine_sleep, False, advice), undo
+    return GrantedRights(scheduled and fine_sleep, False, advice), undo

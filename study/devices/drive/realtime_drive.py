@@ -29,11 +29,11 @@ from equalizer.signals.signal import FloatArray
 from study.devices.clock import Clock
 from study.devices.device import Fault
 from study.devices.drive.compiled_drive import (
-    COURSE_SIZE,
     DUE_S,
     GAP,
     LAST_S,
     LONGEST_GAP_S,
+    LOOP_STATE_SIZE,
     RATE_HZ,
     RUN,
     SPIN_S,
@@ -121,14 +121,16 @@ class RealtimeDrive:
         self._governor = governor
         self._clock = clock
         self._attending = runner if isinstance(runner, SteppedRunner) and runner.attends else None
-        self._course: FloatArray = runner.course if isinstance(runner, SteppedRunner) else np.zeros(COURSE_SIZE)
-        self._course[RATE_HZ] = rate_hz
-        self._course[LONGEST_GAP_S] = longest_gap_s if runner.catches_up else min(longest_gap_s, LATE_S)
+        self._loop_state: FloatArray = (
+            runner.loop_state if isinstance(runner, SteppedRunner) else np.zeros(LOOP_STATE_SIZE)
+        )
+        self._loop_state[RATE_HZ] = rate_hz
+        self._loop_state[LONGEST_GAP_S] = longest_gap_s if runner.catches_up else min(longest_gap_s, LATE_S)
         self._lock = threading.Lock()
         self._awake = threading.Event()
         self._glances = Glances(clock, wake=self._wake)
         self._closing = False
-        self._thread = threading.Thread(target=self._attend, name="haptic loop", daemon=True)
+        self._thread = threading.Thread(target=self._run_ticks, name="haptic loop", daemon=True)
         self._thread.start()
 
     def start(self, begin: Callable[[], None]) -> bool:
@@ -143,11 +145,11 @@ class RealtimeDrive:
         try:
             if self._runner.moving or self._closing or self._runner.failure is not None:
                 return False
-            self._course[LAST_S] = math.inf  # a long preparation is no late tick
+            self._loop_state[LAST_S] = math.inf  # a long preparation is no late tick
             begin()
-            self._course[STARTED_S] = self._course[LAST_S] = now_s = self._clock.now_s()
+            self._loop_state[STARTED_S] = self._loop_state[LAST_S] = now_s = self._clock.now_s()
             self._governor.note_begin(now_s)
-            self._course[RUN] = 0.0
+            self._loop_state[RUN] = 0.0
             self._awake.set()
             return True
         finally:
@@ -155,9 +157,9 @@ class RealtimeDrive:
 
     def _take_lock(self) -> bool:
         for _ in range(round(JOIN_S / ASK_EVERY_S)):
-            self._course[WANTED] = 1.0
+            self._loop_state[WANTED] = 1.0
             if self._lock.acquire(timeout=ASK_EVERY_S):
-                self._course[WANTED] = float(self._glances.wanted)  # the first tick is compiled too
+                self._loop_state[WANTED] = float(self._glances.wanted)  # the first tick is compiled too
                 return True
         return False
 
@@ -188,7 +190,7 @@ class RealtimeDrive:
         self._thread.join(JOIN_S)
 
     def _wake(self) -> None:
-        self._course[WANTED] = 1.0
+        self._loop_state[WANTED] = 1.0
         self._awake.set()
 
     def pump(self, now_s: float) -> None:
@@ -202,26 +204,26 @@ class RealtimeDrive:
                     self._runner.glance()
                     self._glances.mark_taken()
                 return
-            course, run = self._course, int(self._course[RUN])
-            gap_s, course[LAST_S] = now_s - course[LAST_S], now_s
-            if gap_s > course[LONGEST_GAP_S]:
+            loop_state, run = self._loop_state, int(self._loop_state[RUN])
+            gap_s, loop_state[LAST_S] = now_s - loop_state[LAST_S], now_s
+            if gap_s > loop_state[LONGEST_GAP_S]:
                 self._runner.drop(Fault.STALLED)
                 return
             first_s = self._due_s(run + 1)
-            due = ticks_by(now_s - course[STARTED_S], course[RATE_HZ])
+            due = ticks_by(now_s - loop_state[STARTED_S], loop_state[RATE_HZ])
             late = due - run - 1
             if late > 0 and not self._runner.catches_up:
                 self._governor.miss(late)
                 run += late
             self._runner.run(due - run)
-            course[RUN] = due
+            loop_state[RUN] = due
             if not self._runner.catches_up:
                 self._count_lateness(due, first_s)
             if self._glances.wanted:  # asked for a moment before this stimulus began
                 self._glances.mark_taken()
 
     def _due_s(self, tick: int) -> float:
-        return float(self._course[STARTED_S] + tick / self._course[RATE_HZ])
+        return float(self._loop_state[STARTED_S] + tick / self._loop_state[RATE_HZ])
 
     def _count_lateness(self, tick: int, first_s: float) -> None:
         done_s = self._clock.now_s()
@@ -230,9 +232,9 @@ class RealtimeDrive:
     def _late(self) -> bool:
         if not self._thread.is_alive():
             return True
-        return not self._runner.catches_up and bool(self._clock.now_s() - self._course[LAST_S] > LATE_S)
+        return not self._runner.catches_up and bool(self._clock.now_s() - self._loop_state[LAST_S] > LATE_S)
 
-    def _attend(self) -> None:
+    def _run_ticks(self) -> None:
         with real_time_class() if self._first else contextlib.nullcontext():
             self._attend_until_closed()
 
@@ -255,7 +257,7 @@ class RealtimeDrive:
     def _attend_compiled(self) -> bool:
         """Whether ticks were run. Else the thread is wanted, or Python has to run them: one is run by `pump`, before
         which the lock is free."""
-        wanted, self._course[WANTED] = self._course[WANTED] != 0.0, 0.0
+        wanted, self._loop_state[WANTED] = self._loop_state[WANTED] != 0.0, 0.0
         if self._attending is None or wanted:
             return False
         with self._lock:
@@ -263,14 +265,14 @@ class RealtimeDrive:
             if code == GAP:
                 self._runner.drop(Fault.STALLED)
             elif code > 0:  # its zero is written by now
-                self._count_lateness(int(self._course[RUN]), float(self._course[DUE_S]))
+                self._count_lateness(int(self._loop_state[RUN]), float(self._loop_state[DUE_S]))
         return True
 
     def _wait_for_tick(self) -> None:
         if self._runner.catches_up:
             self._clock.sleep(LEISURELY_S)
             return
-        due_s = self._due_s(int(self._course[RUN]) + 1)
+        due_s = self._due_s(int(self._loop_state[RUN]) + 1)
         self._clock.sleep(due_s - SPIN_S - self._clock.now_s())
         while self._clock.now_s() < due_s:
             pass

@@ -12,7 +12,7 @@ from numba import njit, types
 from numba.experimental.function_type import _get_wrapper_address
 
 from study.devices.device import Fault
-from study.devices.drive.seen import Seen
+from study.devices.drive.last_reading import LastReading
 from study.devices.governor import cells
 from study.devices.governor.govern import PUBLISH_SIGNATURE, ROWS, TICK_SIGNATURE, VECTOR, publish, tick
 from study.devices.governor.governor import Governor
@@ -91,7 +91,7 @@ class Runner(Protocol):
         ...
 
     @property
-    def seen(self) -> Seen | None:
+    def seen(self) -> LastReading | None:
         """What was read last, by a tick or a glance. None before that, and where the rig is gone. From any thread."""
         ...
 
@@ -136,7 +136,7 @@ class CompiledRunner:
         self._arrays = (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE))
         # Of its own: how often it is looked at must not change what is recorded.
         self._glance_noise = ~rig.noise
-        self._seen: Seen | None = None
+        self._seen: LastReading | None = None
         self._governor = governor
         self._block_ticks = block_ticks
         self.failure: BaseException | None = None
@@ -147,7 +147,7 @@ class CompiledRunner:
         return self._governor.moving
 
     @property
-    def seen(self) -> Seen | None:
+    def seen(self) -> LastReading | None:
         return self._seen if self.failure is None else None
 
     def prepare(self) -> None:
@@ -159,7 +159,7 @@ class CompiledRunner:
         rig, reading = self._rig, np.zeros(READING_SIZE)
         try:
             rig.sense(rig.state, rig.parameters, self._glance_noise, reading)
-            self._seen = Seen(reading, rig.buttons())
+            self._seen = LastReading(reading, rig.buttons())
         except Exception:  # noqa: BLE001 - a look hears that there is no reading
             self._seen = None
 
@@ -167,7 +167,7 @@ class CompiledRunner:
         try:
             for start in range(0, ticks, self._block_ticks):
                 self._run_block(min(self._block_ticks, ticks - start))
-                self._seen = Seen(self._arrays[-1].copy(), self._rig.buttons())
+                self._seen = LastReading(self._arrays[-1].copy(), self._rig.buttons())
                 if not self._governor.moving:
                     break
         except Exception as error:  # noqa: BLE001 - any error: the force goes off, and the next call says why

@@ -15,9 +15,9 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import Fault
-from study.devices.drive.compiled_drive import COURSE_SIZE, DECIDING, GONE, OVER, STAMPS, WRITING
+from study.devices.drive.compiled_drive import DECIDING, GONE, LOOP_STATE_SIZE, OVER, STAMPS, WRITING
 from study.devices.drive.compiled_ticks import CompiledTicks, halves_of
-from study.devices.drive.seen import Seen
+from study.devices.drive.last_reading import LastReading
 from study.devices.governor import cells, govern
 from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE, Rig
@@ -29,7 +29,7 @@ class Standby:
     def __init__(self, action: Callable[[], bool | None], name: str) -> None:
         self._action = action
         self._asked: SimpleQueue[SimpleQueue[bool] | None] = SimpleQueue()
-        threading.Thread(target=self._work, name=name, daemon=True).start()
+        threading.Thread(target=self._run_thread, name=name, daemon=True).start()
 
     def run(self, patience_s: float) -> bool:
         """Whether it was done within patience_s, with neither an error nor False. It goes on even if the caller is
@@ -45,7 +45,7 @@ class Standby:
         """After what was asked for so far."""
         self._asked.put(None)
 
-    def _work(self) -> None:
+    def _run_thread(self) -> None:
         while (answer := self._asked.get()) is not None:
             try:
                 answer.put(self._action() is not False)
@@ -54,9 +54,10 @@ class Standby:
 
 
 ZERO_PATIENCE_S = 0.1
-"""For a zero force to be written: a hundred times what a driver takes."""
+"""Longest wait for a zero force to be written (s): a hundred times what a driver takes."""
 
 CLOSE_PATIENCE_S = 1.0
+"""Longest wait for the driver to close its device (s)."""
 
 
 class SteppedRunner:
@@ -77,25 +78,25 @@ class SteppedRunner:
         self.catches_up = catches_up
         self.failure: BaseException | None = None
         self.force_off = self.disconnected = True
-        self._seen: Seen | None = None
-        self.course: FloatArray = np.zeros(COURSE_SIZE)
+        self._seen: LastReading | None = None
+        self.loop_state: FloatArray = np.zeros(LOOP_STATE_SIZE)
         halves = halves_of(rig) if now_s is None or monotonic else None
-        self._compiled = CompiledTicks(halves, governor, self.course) if halves is not None else None
-        self.course[STAMPS] = now_s is not None
+        self._compiled = CompiledTicks(halves, governor, self.loop_state) if halves is not None else None
+        self.loop_state[STAMPS] = now_s is not None
         self._closed = self._ended = False
         self._zero = Standby(lambda: rig.write(np.zeros(3)), "force off")
         self._disconnect = Standby(rig.close, "disconnect")
 
     @property
     def moving(self) -> bool:
-        return self._governor.moving or bool(self.course[DECIDING])
+        return self._governor.moving or bool(self.loop_state[DECIDING])
 
     @property
-    def seen(self) -> Seen | None:
-        if self._gone:
+    def seen(self) -> LastReading | None:
+        if self._is_gone:
             return None
         reading = self._compiled.seen() if self._compiled is not None else None
-        return self._seen if reading is None else Seen(reading, self._rig.buttons())
+        return self._seen if reading is None else LastReading(reading, self._rig.buttons())
 
     @property
     def attends(self) -> bool:
@@ -106,44 +107,44 @@ class SteppedRunner:
         """What moves by itself needs no telling."""
 
     @property
-    def _gone(self) -> bool:
-        return bool(self.course[GONE])
+    def _is_gone(self) -> bool:
+        return bool(self.loop_state[GONE])
 
     def glance(self) -> None:
-        if self._gone:
+        if self._is_gone:
             return
         try:
-            self._seen = Seen(self._read(), self._rig.buttons())
+            self._seen = LastReading(self._read(), self._rig.buttons())
         except Exception:  # noqa: BLE001 - a look hears that there is no reading; the next tick says why
             self._seen = None
 
     def run(self, ticks: int) -> None:
-        if self._gone:
+        if self._is_gone:
             self._governor.abandon(Fault.LOST)
             return
-        with self._attended():
+        with self._handle_failures():
             if self._compiled is not None:
                 self._conclude(self._compiled.run(ticks))
                 return
             for _ in range(ticks):
-                if self._tick() or self._gone:
+                if self._tick() or self._is_gone:
                     break
 
     def attend(self) -> int:
-        """Ticks in real time, in `course`, until something is WANTED: see `compiled_drive.attend`, and only where
+        """Ticks in real time, in `loop_state`, until something is WANTED: see `compiled_drive.attend`, and only where
         `attends`. Never raises for a failing rig."""
         assert self._compiled is not None
         code = OVER
-        if self._gone:
+        if self._is_gone:
             self._governor.abandon(Fault.LOST)
             return code
-        with self._attended():
+        with self._handle_failures():
             code = self._compiled.attend()
             self._conclude(code)
         return code
 
     @contextlib.contextmanager
-    def _attended(self) -> Iterator[None]:
+    def _handle_failures(self) -> Iterator[None]:
         """Around ticks: what is done where they fail."""
         try:
             yield
@@ -153,32 +154,32 @@ class SteppedRunner:
             self._silence(Fault.STALLED)
             raise
         finally:
-            if self._gone:
+            if self._is_gone:
                 self._once_more()
 
     def _conclude(self, code: int) -> None:
         assert self._compiled is not None
         if (reading := self._compiled.last_seen()) is not None:
-            self._seen = Seen(reading, self._rig.buttons())
+            self._seen = LastReading(reading, self._rig.buttons())
         if code > 0:
             raise self._compiled.error(code)
 
     def give_up(self, failure: BaseException) -> None:
         self.failure = self.failure or failure
-        self.course[GONE] = 1.0
+        self.loop_state[GONE] = 1.0
         self._silence(Fault.LOST)
 
     def drop(self, fault: Fault) -> None:
         self._silence(fault)
 
     def cut(self) -> None:
-        self.course[GONE] = 1.0
+        self.loop_state[GONE] = 1.0
         self._silence(Fault.STOPPED)
 
     def disconnect(self) -> None:
         if self._ended:
             return
-        self.course[GONE] = 1.0
+        self.loop_state[GONE] = 1.0
         try:
             self._silence(Fault.LOST if self.moving else Fault.NONE)
         finally:
@@ -191,21 +192,21 @@ class SteppedRunner:
     def _tick(self) -> bool:
         governor = self._governor
         reading = self._read()
-        if self._gone:
+        if self._is_gone:
             return True
         if self._now_s is not None:
             governor.state[cells.STAMP_S] = self._now_s()
-        self.course[DECIDING] = 1.0
+        self.loop_state[DECIDING] = 1.0
         over = govern.tick(governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force)
-        self.course[WRITING] = 1.0
+        self.loop_state[WRITING] = 1.0
         try:
             self._rig.write(governor.force.copy())
         finally:
-            self.course[WRITING] = 0.0
-        self.course[DECIDING] = 0.0
+            self.loop_state[WRITING] = 0.0
+        self.loop_state[DECIDING] = 0.0
         govern.publish(governor.state, governor.settings, governor.ring, reading)
         if not over:
-            self._seen = Seen(reading, self._rig.buttons())
+            self._seen = LastReading(reading, self._rig.buttons())
         return bool(over)
 
     def _read(self) -> FloatArray:
@@ -219,15 +220,15 @@ class SteppedRunner:
         written = False
         try:
             written = (
-                self._zero.run(ZERO_PATIENCE_S) and not self.course[WRITING]
+                self._zero.run(ZERO_PATIENCE_S) and not self.loop_state[WRITING]
             )  # what still hangs may come after the zero
         finally:
             self.force_off = written
             if not written:
-                self.course[GONE] = 1.0
+                self.loop_state[GONE] = 1.0
                 self.failure = self.failure or TimeoutError("it took no zero force")
             self._governor.abandon(fault if written else Fault.FORCE_LEFT)
-            self.course[DECIDING] = 0.0
+            self.loop_state[DECIDING] = 0.0
 
     def _once_more(self) -> None:
         """The caller gave up while this thread was in the driver: what it wrote is taken back."""

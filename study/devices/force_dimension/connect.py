@@ -21,7 +21,7 @@ CALIBRATE = (
 
 
 def load_library() -> Library:
-    """Raises `DeviceError`."""
+    """Load the vendor's library. Raises `DeviceError`."""
     computer = this_computer(os.environ)
     path = find_library(computer)
     if path is None:

@@ -12,7 +12,7 @@ from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rigs import info_of
 from study.devices.force_dimension.usb import ADVICE, find_usb_devices
-from study.devices.force_dimension.watchdog_proof import prove_watchdog
+from study.devices.force_dimension.watchdog_check import check_watchdog
 from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
 
@@ -34,11 +34,11 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
     try:
         lab = read_lab()
     except DeviceError as error:
-        return (_wrong("Driver", error), *_usb(), real_time_finding())
+        return (_failed_finding("Driver", error), *_usb(), real_time_finding())
     try:
         library = load_library()
     except DeviceError as error:
-        return (_wrong("Driver", error), *(_usb() or _unplugged()), real_time_finding(), *_sensor(lab))
+        return (_failed_finding("Driver", error), *(_usb() or _unplugged()), real_time_finding(), *_sensor(lab))
     found = DeviceFinding("Library", f"{library.path}, SDK {library.version_text}", fine=True)
     return (found, *_usb(), real_time_finding(), *_sensor(lab), *_of_device(library, MODELS[name], lab))
 
@@ -48,13 +48,13 @@ def _of_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[D
     try:
         handle = open_model(library, model)
     except DeviceError as error:
-        return [_wrong("Driver", error)]
+        return [_failed_finding("Driver", error)]
     try:
         info = info_of(handle, library, model, lab.effective_mass_kg)
         findings.append(DeviceFinding("Connection", f"{info.name}, {info.details}", fine=True))
         findings += _of_opened(handle, model, lab)
     except DeviceError as error:
-        findings.append(_wrong("Driver", error))
+        findings.append(_failed_finding("Driver", error))
     except LibraryError as error:
         advice = "Check its power and its cable, then try again."
         findings.append(DeviceFinding("Driver", f"the library says: {error}", fine=False, advice=advice))
@@ -108,7 +108,7 @@ def _sensor(lab: LabSettings) -> list[DeviceFinding]:
         with contextlib.closing(lab.accelerometer.open_sensor()) as sensor:
             return list(sensor_findings(sensor))
     except DeviceError as error:
-        return [_wrong(SENSOR, error)]
+        return [_failed_finding(SENSOR, error)]
 
 
 def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
@@ -122,7 +122,7 @@ def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[Dev
     if not (status.powered and calibrated):
         return findings
     drops_after_s = make_ready(handle, model, CAP_N, lab.effector_mass_kg)
-    took_s = prove_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
+    took_s = check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
     watchdog = f"set to {1000 * drops_after_s:.1f} ms; without forces the device let go within {1000 * took_s:.0f} ms"
     return [*findings, DeviceFinding("Watchdog", watchdog, fine=True), _masses(model, lab), _gravity(handle)]
 
@@ -153,5 +153,5 @@ def _option(model: DeviceModel) -> str:
     return next(name for name, known in MODELS.items() if known is model)
 
 
-def _wrong(name: str, error: DeviceError) -> DeviceFinding:
+def _failed_finding(name: str, error: DeviceError) -> DeviceFinding:
     return DeviceFinding(name, f"{error.title}. {error.happened}", fine=False, advice=error.do_now)

@@ -30,9 +30,10 @@ OFF_CAUSES = {
     UNCALIBRATED_CAUSE: "it does not know its place any more, and needs to be calibrated",
 }
 WATCHDOG_CAUSE = 3
+"""The library's code for forces that the device's watchdog switched off."""
 
 TRIES = 3
-"""To stop a device whose connection fails."""
+"""Attempts to stop a device whose connection fails."""
 
 
 def why_off(cause: int) -> str:
@@ -57,7 +58,8 @@ class Status:
 
 
 class Handle:
-    """Raises `LibraryError` from every method but `let_go`."""
+    """An open device: the vendor's functions with values in place of pointers. Raises `LibraryError` from every method
+    but `let_go`."""
 
     def __init__(self, library: Library, number: int) -> None:
         self.library = library

@@ -71,21 +71,22 @@ def lab_file() -> Path:
 
 
 def read_lab() -> LabSettings:
-    """Raises `DeviceError` for a file that cannot be read. Without one, nothing is known."""
+    """Read the laboratory's settings. Raises `DeviceError` for a file that cannot be read. Without one, nothing is
+    known."""
     path = lab_file()
     try:
         text = path.read_text("utf-8")
     except FileNotFoundError:
         return LabSettings()
     except (OSError, UnicodeDecodeError) as error:
-        raise _wrong(path, str(error)) from error
+        raise _lab_file_error(path, str(error)) from error
     try:
         return TypeAdapter(LabSettings).validate_python(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
-        raise _wrong(path, str(error)) from error
+        raise _lab_file_error(path, str(error)) from error
     except ValidationError as error:
         first = error.errors()[0]
-        raise _wrong(path, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        raise _lab_file_error(path, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
 
 
 def keep_sensor(table: str) -> Path:
@@ -123,7 +124,7 @@ def _with_sensor(text: str, table: str) -> str:
     return f"{above}\n\n{table.rstrip()}\n" if above else f"{table.rstrip()}\n"
 
 
-def _wrong(path: Path, happened: str) -> DeviceError:
+def _lab_file_error(path: Path, happened: str) -> DeviceError:
     return DeviceError(
         "The settings of the device cannot be used",
         f"{path}: {happened}.",

@@ -16,7 +16,7 @@ from study.devices.native import address_of
 from study.errors import DeviceError
 
 OLDEST_SDK = (3, 16, 0)
-"""From here on all functions are there with the types below; older ones differ in some."""
+"""Oldest version of the vendor's library that has all functions with the types below."""
 
 GEOMETRY_ERROR, DEVICE_IN_USE = 8, 20
 """Error codes of the library on which a decision depends."""
@@ -67,7 +67,7 @@ LINKAGE_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdJointAnglesToInertiaMatrix": (c_int, (_NUMBERS, _NUMBERS, _ID)),
     "dhdJointAnglesToGravityJointTorques": (c_int, (_NUMBERS, _NUMBERS, c_ubyte, _ID)),
 }
-"""For the calibration of the linkage alone: a library without them drives a device all the same."""
+"""Functions for the calibration of the linkage alone: a library without them can drive a device."""
 
 
 class LibraryError(Exception):
@@ -116,7 +116,7 @@ class Library:
         return np.array([address_of(self._functions[name]) for name in names], dtype=np.int64)
 
     def call(self, name: str, *arguments: Any) -> int:
-        """Raises `LibraryError`."""
+        """Call a function of the library. Raises `LibraryError`."""
         return self.check_answer(name, int(self.function(name)(*arguments)))
 
     def _version(self) -> tuple[int, int, int, int]:

@@ -45,14 +45,15 @@ class VendorLinkage:
 
     def at(self, position_m: FloatArray) -> LinkageReading | None:
         """The linkage at a position of the handle; None out of reach. Raises `DeviceError`."""
-        return self._asked(self._at, position_m)
+        return self._ask_library(self._read_at, position_m)
 
     def angles_at(self, position_m: FloatArray) -> FloatArray | None:
         """Joint angles (3,) at a position of the handle, rad; None out of reach. Raises `DeviceError`."""
-        return self._asked(lambda place: self._angles(self._counts(place)), position_m)
+        return self._ask_library(lambda place: self._angles(self._counts(place)), position_m)
 
     def check_frame(self) -> None:
-        """Raises `DeviceError` where the library's delta functions and its positions do not mean the same axes."""
+        """Check the axes of the library's functions for the linkage. Raises `DeviceError` where the library's delta
+        functions and its positions do not mean the same axes."""
         try:
             here = np.array(self._handle.position_m())
         except LibraryError as error:
@@ -75,7 +76,7 @@ class VendorLinkage:
         jacobian = np.nan_to_num(reading.jacobian)
         return float(np.linalg.norm(jacobian @ (angles - reading.joint_angle_rad)))
 
-    def _asked(self, ask: Callable[[FloatArray], Told | None], position_m: FloatArray) -> Told | None:
+    def _ask_library(self, ask: Callable[[FloatArray], Told | None], position_m: FloatArray) -> Told | None:
         """Ask the library for the linkage at a position; None out of reach. Raises `DeviceError`."""
         try:
             return ask(position_m)
@@ -93,7 +94,7 @@ class VendorLinkage:
     def _angles(self, counts: list[c_int]) -> FloatArray:
         return self._three("dhdDeltaEncodersToJointAngles", *counts)
 
-    def _at(self, position_m: FloatArray) -> LinkageReading | None:
+    def _read_at(self, position_m: FloatArray) -> LinkageReading | None:
         counts = self._counts(position_m)
         back = self._three("dhdDeltaEncoderToPosition", *counts)
         if not float(np.linalg.norm(back - position_m)) <= NEAR_M:

@@ -34,13 +34,14 @@ LIBRARY = (
     NUMBER, CAP_N, DROPS_AFTER_S, READS, REPEATED, TOO_STRONG, PRESSED, SENT_S, SENT_ZERO, WITHHELD_UNTIL_S, CLOSED,
     LET_GO, FAILED, OFF_CAUSE, REFUSED_N, ODD, TELLS,
 ) = range(17)  # fmt: skip
-"""Cells of the driver. REPEATED, TOO_STRONG, ODD: readings, forces and status checks beyond their share, as `beyond`
-counts; PRESSED: mask of buttons; OFF_CAUSE, REFUSED_N: for the text of a failure; TELLS: 1 once the device has reported
-a force."""
+"""Cells of the driver. REPEATED, TOO_STRONG, ODD: readings, forces and status checks beyond their share, counted by
+`count_beyond_share`; PRESSED: mask of buttons; OFF_CAUSE, REFUSED_N: for the text of a failure; TELLS: 1 once the
+device has reported a force."""
 
 TOLD, SENT = 17, 20
 """First cells of the force that the device reports (x, y, z; N), and of the last `MEMORY` forces sent (x, y; N)."""
 MEMORY = 3
+"""Forces sent that are remembered, for the comparison with the reported force."""
 CELLS_SIZE = SENT + 2 * MEMORY
 
 OF_LIBRARY = 1
@@ -52,7 +53,7 @@ OF_LIBRARY = 1
 
 
 @part
-def failed(cells: FloatArray, code: int) -> int:
+def record_failure(cells: FloatArray, code: int) -> int:
     """Keep the first failure; return `code`."""
     if cells[FAILED] == 0.0:
         cells[FAILED] = code
@@ -60,12 +61,13 @@ def failed(cells: FloatArray, code: int) -> int:
 
 
 @part
-def of_library(cells: FloatArray, function: int) -> int:
-    return failed(cells, OF_LIBRARY + function - SYSTEM_SIZE)
+def record_library_failure(cells: FloatArray, function: int) -> int:
+    """Record the failure of a function of the vendor's library. Returns its error code."""
+    return record_failure(cells, OF_LIBRARY + function - SYSTEM_SIZE)
 
 
 @part
-def beyond(count: float, happened: bool, share: float) -> float:
+def count_beyond_share(count: float, happened: bool, share: float) -> float:
     """Count an event beyond its allowed share of all times (CUSUM). 1e-12 keeps a sum of steps below a whole."""
     return max(0.0, count + (1.0 if happened else 0.0) - share + 1e-12)
 
@@ -82,7 +84,7 @@ def check_on(calls: Addresses, cells: FloatArray) -> int:
     and OFF_CAUSE holds the cause."""
     status = room_for_16()
     if call_int(calls[STATUS], (status, np.int32(cells[NUMBER]))) < 0:
-        return of_library(cells, STATUS)
+        return record_library_failure(cells, STATUS)
     cause = _number_at(status, OFF_CAUSE_PLACE)
     if _number_at(status, FORCE_ON_PLACE) != 0:
         if _number_at(status, POWERED_PLACE) == 0:
@@ -95,11 +97,12 @@ def check_on(calls: Addresses, cells: FloatArray) -> int:
         return -1
     if cells[FAILED] == 0.0:
         cells[OFF_CAUSE] = cause
-    return failed(cells, RELEASED)
+    return record_failure(cells, RELEASED)
 
 
 @part
 def note_sent(cells: FloatArray, x: float, y: float) -> None:
+    """Keep the horizontal part of a force that was sent, as the newest of `MEMORY`."""
     for place in range(SENT + 2 * MEMORY - 1, SENT + 1, -1):
         cells[place] = cells[place - 2]
     cells[SENT], cells[SENT + 1] = x, y
@@ -127,15 +130,16 @@ def _check_given(calls: Addresses, cells: FloatArray) -> int:
         return 0
     if cells[TOLD] != 0.0 or cells[TOLD + 1] != 0.0:
         cells[TELLS] = 1.0
-    cells[ODD] = beyond(cells[ODD], cells[TELLS] != 0.0 and _gives_another(cells), ODD_SHARE)
-    return 0 if cells[ODD] < ODD_FOR * (1.0 - ODD_SHARE) else failed(cells, GIVES_ANOTHER)
+    cells[ODD] = count_beyond_share(cells[ODD], cells[TELLS] != 0.0 and _gives_another(cells), ODD_SHARE)
+    return 0 if cells[ODD] < ODD_FOR * (1.0 - ODD_SHARE) else record_failure(cells, GIVES_ANOTHER)
 
 
 @part
 def look(calls: Addresses, cells: FloatArray) -> int:
+    """Read buttons, status and the reported force. Returns 0 or an error code."""
     pressed = call_int(calls[BUTTONS], (np.int32(cells[NUMBER]),))
     if pressed == -1:  # no device has 32 buttons
-        return of_library(cells, BUTTONS)
+        return record_library_failure(cells, BUTTONS)
     cells[PRESSED] = pressed & 0xFFFFFFFF
     code = max(0, check_on(calls, cells))
     return code if code != 0 else _check_given(calls, cells)

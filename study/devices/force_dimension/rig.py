@@ -1,6 +1,6 @@
 """A device of the vendor as a rig: readings, forces, and everything that releases its force.
 
-Beyond what the safety layer does, a force above the cap or no number is never sent (`halves`), and the library is told
+Beyond what the safety layer does, a force above the cap or no number is never sent (`tick_io`), and the library is told
 the cap as well. Anything odd ends in an error: the safety layer then writes zero, and the watchdog sees to the rest.
 """
 
@@ -14,12 +14,12 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
-from study.devices.force_dimension import halves, loop_cells
-from study.devices.force_dimension.halves import LOCK_S
+from study.devices.force_dimension import loop_cells, tick_io
 from study.devices.force_dimension.handle import Handle, why_off
 from study.devices.force_dimension.library import LibraryError
+from study.devices.force_dimension.tick_io import LOCK_S
 from study.devices.native import SharedLock, system_calls
-from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, Halves, Sensed
+from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, CompiledIo, SensedAcceleration
 from study.errors import DeviceError
 
 REST_SHARE = 0.25
@@ -33,8 +33,8 @@ class Accelerometer(Protocol):
         """Acceleration (3,), m/s², NaN where there is none of now; whether a channel is at its limit. Cheap."""
         ...
 
-    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
-        """Sensor reading apart from the position: the port of `study.devices.rig.SensesApart`."""
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
+        """Sensor reading apart from the position: the port of `study.devices.rig.OwnClockSensor`."""
         ...
 
     def close(self) -> None:
@@ -72,18 +72,18 @@ class ForceDimensionRig:
         self._failure: DeviceError | None = None
         self._closed = threading.Event()
         if rests and drops_force_after_s > 0:
-            threading.Thread(target=self._rest, name="gravity compensation", daemon=True).start()
+            threading.Thread(target=self._repeat_zero_force, name="gravity compensation", daemon=True).start()
 
     @property
-    def halves(self) -> Halves | None:
+    def halves(self) -> CompiledIo | None:
         """The two halves of a compiled tick; None with an accelerometer that compiled code cannot read."""
         if self._overlaid is not None:
             return None
-        return Halves(halves.sense_once, halves.write_once, self._calls, self._cells, self._samples, self._error)
+        return CompiledIo(tick_io.sense_once, tick_io.write_once, self._calls, self._cells, self._samples, self._error)
 
     def sense(self) -> FloatArray:
         reading = np.empty(READING_SIZE)
-        self._raise_for(halves.sense_once(self._calls, self._cells, self._samples, reading))
+        self._raise_for(tick_io.sense_once(self._calls, self._cells, self._samples, reading))
         if self._overlaid is not None:
             reading[ACCELERATION], clipped = self._overlaid.latest()
             reading[SENSOR_CLIPPED] = float(clipped)
@@ -94,9 +94,9 @@ class ForceDimensionRig:
         return frozenset(bit for bit in range(32) if mask >> bit & 1)
 
     def write(self, force_n: FloatArray) -> None:
-        self._raise_for(halves.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
+        self._raise_for(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
 
-    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> Sensed | None:
+    def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
         return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
 
     def withhold(self, seconds: float) -> float:
@@ -149,14 +149,14 @@ class ForceDimensionRig:
                 self._accelerometer.close()
         return bool(self._cells[loop_cells.LET_GO])
 
-    def _rest(self) -> None:
+    def _repeat_zero_force(self) -> None:
         """Repeat a zero force. Never sends one between two forces, nor anything after a failure."""
         every_s, zero, cells = REST_SHARE * self.drops_force_after_s, np.zeros(3), self._cells
         while not self._closed.wait(every_s) and cells[loop_cells.FAILED] == 0.0:
             with self._sending:
                 resting = cells[loop_cells.SENT_ZERO] and time.monotonic() - cells[loop_cells.SENT_S] >= every_s
                 if resting and not self._closed.is_set():
-                    code = halves.send_once(self._calls, cells, zero)
+                    code = tick_io.send_once(self._calls, cells, zero)
                     if code:
                         self._error(code)
                         return
@@ -168,9 +168,9 @@ class ForceDimensionRig:
     def _error(self, code: int) -> DeviceError:
         """The error of a code; called in the thread that got the code, because the library keeps its last error per
         thread."""
-        return self._failure or self._fail(self._words(int(self._cells[loop_cells.FAILED]) or code))
+        return self._failure or self._fail(self._error_text(int(self._cells[loop_cells.FAILED]) or code))
 
-    def _words(self, code: int) -> str:
+    def _error_text(self, code: int) -> str:
         function = code - loop_cells.OF_LIBRARY
         if 0 <= function < len(loop_cells.LIBRARY):
             return f"The library says: {self._handle.library.last_error(loop_cells.LIBRARY[function])}"

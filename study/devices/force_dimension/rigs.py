@@ -1,4 +1,4 @@
-"""Builds the rig of a named device: library, device, watchdog and its proof, gravity compensation."""
+"""Builds the rig of a named device: library, device, watchdog and its test, gravity compensation."""
 
 import time
 from dataclasses import replace
@@ -13,13 +13,15 @@ from study.devices.force_dimension.lab import LabSettings, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rig import ForceDimensionRig
-from study.devices.force_dimension.watchdog_proof import prove_watchdog
+from study.devices.force_dimension.watchdog_check import check_watchdog
 
 RATE_HZ = 1000.0
+"""Rate of the loop (Hz)."""
 
 
 def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:
-    """Raises `DeviceError` that says what is missing. What was opened until then is stopped and closed again."""
+    """Open a device of the vendor by name, with calibration, watchdog and gravity compensation. Raises `DeviceError`
+    that says what is missing. What was opened until then is stopped and closed again."""
     model, lab = MODELS[name], read_lab()
     library = load_library()
     sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None and settings.with_sensor else None
@@ -46,7 +48,7 @@ def _rig(
         cap_n = min(settings.limits.total_cap_n, model.max_force_n)
         drops_after_s = make_ready(handle, model, cap_n, lab.effector_mass_kg)
         if drops_after_s > 0:
-            prove_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
+            check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
     except LibraryError as error:
         handle.let_go()
@@ -57,7 +59,7 @@ def _rig(
 
 
 def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
-    """Raises `LibraryError`."""
+    """Facts about an open device. Raises `LibraryError`."""
     return DeviceInfo(
         name=model.name,
         simulated=False,

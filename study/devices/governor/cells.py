@@ -1,4 +1,4 @@
-"""Where each number stands in the arrays that the governed tick reads and changes, and what its codes mean."""
+"""Layout of the arrays that the control tick reads and changes (settings, state, rows), and its codes."""
 
 import numpy as np
 
@@ -45,7 +45,7 @@ STILL, PLAYING, RELEASING, LETTING_GO = range(4)
 last force: straight to zero, needing neither sensor nor program, and exempt from the slew limit."""
 
 NO_FAULT, NOT_A_NUMBER, STALLED, HELD_TOO_LONG, STOPPED, LOST, FORCE_LEFT, OUTSIDE, JUMPED, SHAKEN, STALE = range(11)
-"""In the order of `study.devices.device.Fault`."""
+"""Codes of faults, in the order of `study.devices.device.Fault`."""
 
 ROW_SIZE = 15
 """A row of the recording: command, excitation, position, acceleration, true acceleration."""

@@ -6,6 +6,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import part
 
 OVERFLOWING = 1e100
+"""Norm (N) above which squares of components may overflow; such a force becomes zero."""
 
 WITHIN, BEYOND = 1 - 1e-12, 1 + 1e-9
 """Forces are confined to the first share of a limit: rounding cannot then carry them over it. They count as limited
@@ -14,17 +15,19 @@ from the second share on: a stimulus that is just at its cap is not clipped."""
 
 @part
 def norm_of(x: float, y: float, z: float) -> float:
+    """Euclidean norm of a vector."""
     return math.sqrt(x * x + y * y + z * z)
 
 
 @part
-def below(vector: FloatArray, bound: float) -> bool:
+def is_bounded(vector: FloatArray, bound: float) -> bool:
     """False for NaN and infinity too."""
     return bool(abs(vector[0]) < bound and abs(vector[1]) < bound and abs(vector[2]) < bound)
 
 
 @part
 def clear(force: FloatArray) -> None:
+    """Set a force to zero."""
     for i in range(3):
         force[i] = 0.0
 
@@ -40,7 +43,7 @@ def kept_share(norm: float, cap: float) -> float:
 @part
 def confine(force: FloatArray, cap: float) -> bool:
     """Shorten to the cap, direction kept; zero if it is no force at all. Whether it was above the cap."""
-    if not (below(force, OVERFLOWING) and cap > 0.0):
+    if not (is_bounded(force, OVERFLOWING) and cap > 0.0):
         clear(force)
         return False
     norm = norm_of(force[0], force[1], force[2])

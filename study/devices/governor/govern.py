@@ -1,8 +1,15 @@
-"""The heart of the safety layer: one tick decides one force, and nothing else in the program decides any.
+"""The safety layer's control tick: the only code in the program that decides a force.
 
-The order within a tick: hear what was asked, judge the reading (`plausibility`), aim (stimulus, and `feedback`), limit,
-and confine the result once more. The last step trusts none of the others: a force is never written that is above
-the cap or not a number. The machine code on disk is kept in step with all these files: see `compiling`."""
+In this order, function `tick`:
+
+1. requests (stop, release) and timeouts change the phase: still, playing, releasing, letting go;
+2. the position reading is checked (`plausibility`); an implausible one is a fault, which starts the safety fade;
+3. the stimulus is capped, faded and added to spring and damper (`feedback`); the sum is capped, its slew rate limited;
+4. the result is capped once more, independent of all steps before: no force above the cap, and none that is not a
+   number, is ever written.
+
+The machine code on disk is kept in step with all these files: see `compiling`.
+"""
 
 import math
 from pathlib import Path
@@ -12,7 +19,7 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import fingerprint, part
-from study.devices.governor.confine import BEYOND, WITHIN, below, clear, confine, norm_of
+from study.devices.governor.confine import BEYOND, WITHIN, clear, confine, is_bounded, norm_of
 from study.devices.governor.feedback import add_feedback
 from study.devices.governor.plausibility import fault_of_reading
 from study.devices.governor.telemetry_row import write_row
@@ -32,7 +39,7 @@ from study.devices.governor.cells import (
 # isort: on
 
 IMPLAUSIBLE_N = 1e6
-"""Treated like NaN."""
+"""Component of a stimulus (N) from which it is treated like NaN."""
 
 LEAST_ELAPSED = 1e-3
 """Ticks between two readings: a time stamp that stood still, went back or is no number counts as so many."""
@@ -44,7 +51,8 @@ MISS_SIGNATURE = types.void(VECTOR, ROWS, VECTOR, types.int64)
 
 
 @part
-def _let_go(state: FloatArray, fault: int) -> None:
+def _start_safety_fade(state: FloatArray, fault: int) -> None:
+    """Begin the fade of the last force to zero, which needs neither sensor nor program; keeps the first fault."""
     state[PHASE] = LETTING_GO
     state[LET_GO_AT] = state[TICK]
     for i in range(3):
@@ -54,7 +62,8 @@ def _let_go(state: FloatArray, fault: int) -> None:
 
 
 @part
-def _hear_while_playing(state: FloatArray, settings: FloatArray) -> None:
+def _update_phase_while_playing(state: FloatArray, settings: FloatArray) -> None:
+    """End of the stimulus: by request, at its length, without a sign of life (watchdog), or after the longest time."""
     tick = state[TICK]
     if state[SIGN_OF_LIFE] != 0.0:
         state[SIGN_OF_LIFE] = 0.0
@@ -63,28 +72,28 @@ def _hear_while_playing(state: FloatArray, settings: FloatArray) -> None:
         state[PHASE] = RELEASING
         state[RELEASED_AT] = tick
     elif tick - state[LAST_SIGN] > settings[WATCHDOG_TICKS]:
-        _let_go(state, STALLED)
+        _start_safety_fade(state, STALLED)
     elif tick >= state[LONGEST]:
-        _let_go(state, HELD_TOO_LONG)
+        _start_safety_fade(state, HELD_TOO_LONG)
 
 
 @part
-def _hear(state: FloatArray, settings: FloatArray) -> None:
-    """Change of phase: what was asked for, and what was asked too long ago."""
+def _update_phase(state: FloatArray, settings: FloatArray) -> None:
+    """Change of phase by requests and by time."""
     phase = state[PHASE]
     if state[STOP_ASKED] != 0.0:
         if phase != STILL and state[FAULT] == NO_FAULT:
             state[FAULT] = STOPPED
         state[PHASE] = STILL
     elif state[LET_GO_ASKED] != 0.0 and phase in (PLAYING, RELEASING):
-        _let_go(state, NO_FAULT)
+        _start_safety_fade(state, NO_FAULT)
     elif phase == PLAYING:
-        _hear_while_playing(state, settings)
+        _update_phase_while_playing(state, settings)
     elif phase == RELEASING and state[TICK] - state[RELEASED_AT] > state[FADE_OUT]:
         if state[FORCE] == 0.0 and state[FORCE + 1] == 0.0 and state[FORCE + 2] == 0.0:
             state[PHASE] = STILL
         else:
-            _let_go(state, NO_FAULT)  # the slew limit held it up
+            _start_safety_fade(state, NO_FAULT)  # the slew limit held it up
 
 
 @part
@@ -112,7 +121,7 @@ def _gains(state: FloatArray) -> tuple[float, float]:
 
 
 @part
-def _stamp(state: FloatArray, settings: FloatArray) -> None:
+def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
     """Ticks since the last reading, by the loop's clock where it stamps its readings."""
     elapsed = state[TICK] - state[READ_AT]
     if state[STAMP_S] > 0.0 and state[READ_AT_S] > 0.0:
@@ -135,7 +144,10 @@ def _limit_slew(state: FloatArray, settings: FloatArray, force: FloatArray) -> b
 
 
 @part
-def _aim(state: FloatArray, settings: FloatArray, loop: FloatArray, reading: FloatArray, force: FloatArray) -> None:
+def _compute_force(
+    state: FloatArray, settings: FloatArray, loop: FloatArray, reading: FloatArray, force: FloatArray
+) -> None:
+    """The force of stimulus, spring and damper within all limits; a fault where stimulus or reading is implausible."""
     tick = int(state[TICK])
     clear(force)
     if 0 <= tick < state[LENGTH]:
@@ -143,10 +155,10 @@ def _aim(state: FloatArray, settings: FloatArray, loop: FloatArray, reading: Flo
         row = tick if tick < lead else lead + (tick - lead) % (loop.shape[0] - lead)
         for i in range(3):
             force[i] = loop[row, i]
-    _stamp(state, settings)
-    fault = fault_of_reading(state, settings, reading) if below(force, IMPLAUSIBLE_N) else NOT_A_NUMBER
+    _update_elapsed(state, settings)
+    fault = fault_of_reading(state, settings, reading) if is_bounded(force, IMPLAUSIBLE_N) else NOT_A_NUMBER
     if fault != NO_FAULT:
-        _let_go(state, fault)
+        _start_safety_fade(state, fault)
         return
     state[STIMULUS_CLIPPED] += confine(force, settings[STIMULUS_CAP])
     stimulus_gain, spring_gain = _gains(state)
@@ -161,7 +173,8 @@ def _aim(state: FloatArray, settings: FloatArray, loop: FloatArray, reading: Flo
 
 
 @part
-def _fade(state: FloatArray, settings: FloatArray, force: FloatArray) -> None:
+def _apply_safety_fade(state: FloatArray, settings: FloatArray, force: FloatArray) -> None:
+    """Linear fade of the force at its begin, within `LET_GO_TICKS`."""
     left = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0) / settings[LET_GO_TICKS]
     for i in range(3):
         force[i] = max(left, 0.0) * state[LET_GO_FROM + i]
@@ -209,17 +222,17 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
         state: FloatArray, settings: FloatArray, loop: FloatArray, buffer: FloatArray, reading: FloatArray,
         force: FloatArray,
     ) -> bool:  # fmt: skip
-        """Decide the force of one tick. Whether all is over and the force off.
+        """Decide the force of one tick. Returns whether the force is off and stays off.
 
         state (STATE_SIZE,), settings (SETTINGS_SIZE,), loop (n, 3) in N, buffer (rows, ROW_SIZE): changed in place with
         state; reading (READING_SIZE,): as the rig sensed it; force (3,), N: the answer.
         """
         _ = sources
-        _hear(state, settings)
+        _update_phase(state, settings)
         if state[PHASE] in (PLAYING, RELEASING):
-            _aim(state, settings, loop, reading, force)
+            _compute_force(state, settings, loop, reading, force)
         if state[PHASE] == LETTING_GO:
-            _fade(state, settings, force)
+            _apply_safety_fade(state, settings, force)
         if state[PHASE] == STILL:
             clear(force)
         confine(force, settings[TOTAL_CAP])

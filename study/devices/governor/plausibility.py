@@ -40,7 +40,7 @@ from study.devices.governor.cells import (
     WORKSPACE,
 )
 from study.devices.governor.compiling import part
-from study.devices.governor.confine import below, norm_of
+from study.devices.governor.confine import is_bounded, norm_of
 
 IMPLAUSIBLE_M = 0.5
 """A reading beyond this counts as no number at all."""
@@ -124,7 +124,7 @@ def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: f
 @part
 def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArray) -> int:
     """NO_FAULT, or why the force must be let go. LAST_POSITION and ELAPSED say what was before."""
-    if not below(reading, IMPLAUSIBLE_M):
+    if not is_bounded(reading, IMPLAUSIBLE_M):
         return NOT_A_NUMBER
     if not norm_of(reading[0], reading[1], reading[2]) <= settings[WORKSPACE]:
         return OUTSIDE

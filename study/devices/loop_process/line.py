@@ -23,7 +23,7 @@ LINES = ("work", "signs", "look", "stop", "close")
 stop."""
 
 VALUE, ERROR, PROGRESS = range(3)
-"""What a message is. After PROGRESS the other side waits for a bool: whether to go on."""
+"""Kinds of messages. After PROGRESS the other side waits for a bool: whether to go on."""
 
 
 GRACE_S = 0.5
@@ -75,7 +75,7 @@ class Call:
         after that of 1, when a request and a recording are sent. Raises what was raised there, `LoopGoneError`, and
         what `on_progress` raises. May be called again when it was interrupted."""
         share: float | None = 1.0
-        while (share := self._next(patience_s + sending_s * (share == 1.0), grace_s)) is not None:
+        while (share := self._next_progress(patience_s + sending_s * (share == 1.0), grace_s)) is not None:
             if on_progress is not None:
                 on_progress(share)
             self.goes_on.put(True)
@@ -88,12 +88,12 @@ class Call:
     def break_off(self, patience_s: float) -> None:
         """Have it end early, and wait until it has. Raises `LoopGoneError`."""
         self.goes_on.put(False)
-        while self._next(patience_s) is not None:
+        while self._next_progress(patience_s) is not None:
             pass
         if self._last is not None and isinstance(self._last[1], LoopGoneError):
             raise self._last[1]
 
-    def _next(self, patience_s: float, grace_s: float | None = None) -> float | None:
+    def _next_progress(self, patience_s: float, grace_s: float | None = None) -> float | None:
         """The next progress, or None when the call is over."""
         for wait_s in (patience_s, GRACE_S if grace_s is None else grace_s):
             self._news.clear()
@@ -115,7 +115,7 @@ class Line:
         self._connection = connection
         self._calls: SimpleQueue[Call | None] = SimpleQueue()
         self._ended = threading.Event()
-        threading.Thread(target=self._work, name=f"line {name}", daemon=True).start()
+        threading.Thread(target=self._run_thread, name=f"line {name}", daemon=True).start()
 
     def begin(self, name: str, *arguments: Any) -> Call:
         """Returns at once; sent when all earlier calls of this line are over. Raises where it cannot be sent."""
@@ -129,14 +129,14 @@ class Line:
         """Close the pipe after the calls so far."""
         self._calls.put(None)
 
-    def _work(self) -> None:
+    def _run_thread(self) -> None:
         try:
             with self._connection:
                 while (call := self._calls.get()) is not None:
                     try:
                         self._transact(call)
                     except Exception as error:  # noqa: BLE001 - a broken pipe, or an answer that cannot be read
-                        call.hear((ERROR, _gone(error)))
+                        call.hear((ERROR, _loop_gone_error(error)))
         finally:
             self._ended.set()
             self._refuse_all()
@@ -160,7 +160,7 @@ class Line:
         call.hear(message)
 
 
-def _gone(error: Exception) -> LoopGoneError:
+def _loop_gone_error(error: Exception) -> LoopGoneError:
     if isinstance(error, EOFError | OSError):
         return LoopGoneError("it ended", hangs=False)
     return LoopGoneError(f"its answer cannot be read ({type(error).__name__}: {error})", hangs=False)

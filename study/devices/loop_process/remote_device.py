@@ -38,7 +38,8 @@ NEVER_HELD = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
 
 
 def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevice":
-    """Raises what opening the device in the process raised, or `DeviceError` where that ended or hangs."""
+    """Open a device in a process of its own. Raises what opening the device in the process raised, or `DeviceError`
+    where that ended or hangs."""
     process: LoopProcess | None = None
     ring = Ring()
     try:
@@ -100,18 +101,18 @@ class RemoteDevice:
         self._must_be_idle()
         before, self._held = self._held, stimulus
         try:
-            self._ask(self._process.work, "hold", stimulus)
+            self._call_remote(self._process.work, "hold", stimulus)
         except Exception:
             self._held = before
             raise
 
     def keep_alive(self) -> None:
         with contextlib.suppress(DeviceError):
-            self._ask(self._process.signs, "keep_alive")
+            self._call_remote(self._process.signs, "keep_alive")
 
     def fault(self) -> Fault:
         try:
-            fault: Fault = self._ask(self._process.signs, "fault")
+            fault: Fault = self._call_remote(self._process.signs, "fault")
         except DeviceError:
             return self._fault_of_the_lost()
         self._force_left |= fault is Fault.FORCE_LEFT
@@ -119,7 +120,7 @@ class RemoteDevice:
 
     def health(self) -> Health:
         try:
-            return self._noted(self._ask(self._process.signs, "health"))
+            return self._note_health(self._call_remote(self._process.signs, "health"))
         except DeviceError:
             return self._health_of_the_lost()
 
@@ -140,7 +141,7 @@ class RemoteDevice:
         except Exception:  # was raised there. After an interruption the answer is asked for again.
             self._releasing = self._held = None
             raise
-        self._noted(played.health)
+        self._note_health(played.health)
         self._releasing = self._held = None
         return played
 
@@ -157,12 +158,12 @@ class RemoteDevice:
             if not call.over:
                 self._break_off(call, patience_s)
             raise
-        self._noted(played.health)
+        self._note_health(played.health)
         return played
 
     def look(self) -> Look:
         with contextlib.suppress(DeviceError):
-            look: Look = self._ask(self._process.look, "look")
+            look: Look = self._call_remote(self._process.look, "look")
             return look
         return Look(None, None, sensor_clipped=False, buttons=frozenset(), missed_ticks=0)
 
@@ -188,7 +189,9 @@ class RemoteDevice:
         try:
             if not (self._lost or self._closed):
                 with contextlib.suppress(DeviceError):
-                    self._noted(self._ask(self._process.close, "close", patience_s=self._fade_s + CLOSE_S))
+                    self._note_health(
+                        self._call_remote(self._process.close, "close", patience_s=self._fade_s + CLOSE_S)
+                    )
         finally:  # it lets go by itself then
             self._closed = True
             self._process.hang_up()
@@ -210,7 +213,7 @@ class RemoteDevice:
     def _patience_s(self, recorded_s: float) -> float:
         return self._fade_s + ANSWER_S + SENT_S_PER_RECORDED_S * recorded_s
 
-    def _ask(self, line: Line, name: str, *arguments: Any, patience_s: float | None = None) -> Any:
+    def _call_remote(self, line: Line, name: str, *arguments: Any, patience_s: float | None = None) -> Any:
         """Raises `DeviceError` for a device that is lost or closed, and what was raised there."""
         self._must_be_there()
         try:
@@ -235,7 +238,7 @@ class RemoteDevice:
                 # One that hung up may be letting go just now.
                 self._lost = f"{gone}, {self._process.end(0.0 if gone.hangs else self._fade_s + CLOSE_S)}"
 
-    def _noted(self, health: Health) -> Health:
+    def _note_health(self, health: Health) -> Health:
         self._health = health
         self._force_left |= health.fault is Fault.FORCE_LEFT
         return health

@@ -21,12 +21,13 @@ from equalizer.signals.signal import Signal
 from study.devices.clock import RealClock
 from study.devices.device import Device, Played
 from study.devices.loop_process.line import CLOSE_S, ERROR, LINES, PROGRESS, VALUE, End
-from study.devices.opening import before_others, open_device
+from study.devices.opening import open_device, raise_thread_priority
 
 LOOK_EVERY_S = 0.2
 """Whether the caller's process is there still: a fork of it may hold its end of a pipe open."""
 
 LAST_ANSWER_S = 1.0
+"""Longest wait for the thread that sends the last answer (s)."""
 
 OPENING_GRACE_S = 1.0
 """While the device is opened, no force of a stimulus is on that a fade would end: the process ends soon."""
@@ -48,13 +49,13 @@ class DeviceServer:
         device: Device,
         ends: tuple[End, ...],
         at_rest: Callable[[], object] = lambda: None,
-        before_others: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
+        raise_thread_priority: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     ) -> None:
-        """ends: of `LINES`. at_rest: called after each stimulus. before_others: entered by the threads that a stop and
-        a sign of life wait for."""
+        """ends: of `LINES`. at_rest: called after each stimulus. raise_thread_priority: entered by the threads that
+        a stop and a sign of life wait for."""
         self._device = device
         self._at_rest = at_rest
-        self._before_others = before_others
+        self._raise_priority = raise_thread_priority
         self._closed = threading.Event()
         self.ended = threading.Event()
         """The caller is gone, or wants the device closed."""
@@ -62,7 +63,11 @@ class DeviceServer:
         tables: tuple[tuple[End, dict[str, Callable[..., Any]]], ...] = (
             (
                 work,
-                {"hold": device.hold, "release": device.release, "play": lambda commands: self._play(work, commands)},
+                {
+                    "hold": device.hold,
+                    "release": device.release,
+                    "play": lambda commands: self._play_commands(work, commands),
+                },
             ),
             (signs, {"keep_alive": device.keep_alive, "fault": device.fault, "health": device.health}),
             (look, {"look": device.look}),
@@ -87,7 +92,7 @@ class DeviceServer:
     def _serve(self, end: End, table: dict[str, Callable[..., Any]]) -> None:
         urgent = "stop" in table or "keep_alive" in table
         try:
-            with self._before_others() if urgent else contextlib.nullcontext():
+            with self._raise_priority() if urgent else contextlib.nullcontext():
                 while not self._closed.is_set():
                     name, arguments = end.recv()
                     end.send(_answer(table[name], arguments))
@@ -98,7 +103,7 @@ class DeviceServer:
         finally:
             self.ended.set()
 
-    def _play(self, end: End, commands: Signal) -> Played:
+    def _play_commands(self, end: End, commands: Signal) -> Played:
         def go_on(share: float) -> None:
             end.send((PROGRESS, share))
             if not end.recv():
@@ -159,7 +164,7 @@ def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
         gc.freeze()
         gc.disable()
         ends[0].send((VALUE, device.info))
-        server = DeviceServer(device, ends, at_rest=gc.collect, before_others=before_others)
+        server = DeviceServer(device, ends, at_rest=gc.collect, raise_thread_priority=raise_thread_priority)
         server.start()
         while not (server.ended.wait(LOOK_EVERY_S) or lifetime.is_over()):
             pass

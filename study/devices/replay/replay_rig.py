@@ -73,7 +73,7 @@ sense, advance = _entry_points(fingerprint(Path(__file__).parent, Path(__file__)
 
 
 def replay_rig(path: Path) -> CompiledRig:
-    """Raises `DeviceError` for a file that cannot be replayed."""
+    """A recording as a rig. Raises `DeviceError` for a file that cannot be replayed."""
     try:
         recording = read_recording(path)
     except StudyError as problem:

@@ -66,5 +66,6 @@ def step_bending(state: FloatArray, parameters: FloatArray, pulls: FloatArray, p
 
 @inlined
 def step_sensor(state: FloatArray, parameters: FloatArray) -> None:
+    """First-order low pass of the accelerometer: one step of each axis."""
     for axis in range(3):
         state[FILTERED + axis] += parameters[SENSOR_POLE] * (state[TRUE + axis] - state[FILTERED + axis])

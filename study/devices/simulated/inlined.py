@@ -1,4 +1,4 @@
-"""How every function within a tick is compiled."""
+"""Compiler settings of every function within a tick."""
 
 from numba import njit
 

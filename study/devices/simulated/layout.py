@@ -1,11 +1,17 @@
-"""Where each number stands in the flat arrays that the compiled functions share."""
+"""Layout of the two flat arrays that the compiled functions share: state and parameters, in SI units.
+
+Each constant is the index of a quantity's first number; the next constant shows how many there are. The equations:
+docs/simulated_omega3.md.
+"""
 
 MODES = 6
 """Handle modes; a shape, so known when compiled."""
 MOUNTS = 2
+"""Modes of the mount: its base rocks in two directions."""
 SUBSTEPS = 10
 """Steps of integration in a tick."""
 TICK_S = 1e-3
+"""Duration of a tick of the loop (s)."""
 STEP_S = TICK_S / SUBSTEPS
 
 # State, SI units.
@@ -24,6 +30,7 @@ BENDING_SPEED = BENDING + MODES
 TORQUE = BENDING_SPEED + MODES
 """Motor torques behind the amplifiers' bandwidth."""
 BRISTLE = TORQUE + 3
+"""Deflections of the friction's bristles, one per motor."""
 FILTERED = BRISTLE + 3
 """Acceleration behind the accelerometer's bandwidth."""
 TRUE = FILTERED + 3
@@ -32,6 +39,7 @@ STATE_SIZE = TRUE + 3
 
 # Parameters, SI units.
 UPPER_ARM = 0
+"""Length, as the next three."""
 FOREARM = 1
 RADIUS = 2
 PLATFORM_DEPTH = 3
@@ -44,9 +52,12 @@ DRIVE_INERTIA = ARM_INERTIA + 1
 AMPLIFIER = DRIVE_INERTIA + 1
 """Part of the way that the torque goes in one step."""
 FRICTION = AMPLIFIER + 1
+"""Coulomb friction of a motor, N m."""
 PRESLIDING = FRICTION + 1
+"""Angle over which the friction of a motor builds up after a reversal, rad."""
 DRIVE_DAMPING = PRESLIDING + 1
 CABLE = DRIVE_DAMPING + 1
+"""Stiffness of each cable."""
 CABLE_DAMPING = CABLE + 3
 COUNT = CABLE_DAMPING + 3
 """One encoder count, rad."""
@@ -59,6 +70,7 @@ MODE_MASS = MOUNT_DIRECTION + 3 * MOUNTS
 MODE_STIFFNESS = MODE_MASS + MODES
 MODE_DAMPING = MODE_STIFFNESS + MODES
 MODE_GAIN = MODE_DAMPING + MODES
+"""Share of each mode in the motion at the sensor."""
 MODE_DIRECTION = MODE_GAIN + MODES
 """(MODES, 3), unit vectors."""
 HAND_DAMPING = MODE_DIRECTION + 3 * MODES

@@ -14,6 +14,7 @@ from study.devices.simulated.parameters import Omega3Parameters, Vector
 
 NAME = "simulated omega.3"
 MAX_FORCE_N = 12.0
+"""Largest force of an omega.3 by its data sheet (N)."""
 
 
 def build_omega3(

@@ -1,4 +1,4 @@
-"""From named parameters to the flat arrays of the compiled functions."""
+"""Packs named parameters into the flat array of the compiled functions (`layout`)."""
 
 import math
 
@@ -11,7 +11,7 @@ from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Omega3Para
 
 
 def isotropic_depth_m(linkage: Linkage) -> float:
-    """Distance of that point from the base plane.
+    """Distance from the base plane to the isotropic point on the axis, where the inertia is the same in all directions.
 
     On the axis each Jacobian row is parallel to its forearm. Three rows at 120 degrees give J^T J a multiple of the
     identity when the forearm's radial part is sqrt(2) times its axial part.
@@ -66,6 +66,7 @@ def _unit(directions: tuple[Vector, ...]) -> FloatArray:
 
 
 def _pole(frequency_hz: float) -> float:
+    """Share of the way to its input that a first-order low pass goes in one integration step."""
     return 1.0 - math.exp(-2 * math.pi * frequency_hz * layout.STEP_S)
 
 
@@ -127,9 +128,9 @@ def _pack_sensor(packed: FloatArray, parameters: Omega3Parameters) -> None:
     sensor = parameters.accelerometer
     about_x, about_y, about_z = np.radians(sensor.turns_deg)
     yz, zx, xy = sensor.cross_axis
-    turned = np.array([[1, about_z, -about_y], [-about_z, 1, about_x], [about_y, -about_x, 1]])
-    leaking = np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]])
-    _put(packed, layout.SENSOR_MATRIX, leaking @ turned)
+    rotation = np.array([[1, about_z, -about_y], [-about_z, 1, about_x], [about_y, -about_x, 1]])
+    cross_axis = np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]])
+    _put(packed, layout.SENSOR_MATRIX, cross_axis @ rotation)
     packed[layout.SENSOR_POLE] = _pole(sensor.bandwidth_hz)
     noise_bandwidth_hz = math.pi / 2 * sensor.bandwidth_hz
     density = np.array(sensor.noise_g_per_rthz)

@@ -1,4 +1,4 @@
-"""What a tick reads: encoders of finite resolution, and an ADXL335 with noise, range and mounting errors.
+"""Simulated sensors: encoders of finite resolution, and an ADXL335 with noise, range and mounting errors.
 
 Its normal random numbers come from one 64-bit word of state (SplitMix64: G. L. Steele, D. Lea, C. H. Flood, "Fast
 splittable pseudorandom number generators", OOPSLA 2014), so that a recording depends on its seed alone.
@@ -30,6 +30,7 @@ _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 _ULP = 2.0**-53
+"""Spacing of the uniform numbers: 53 random bits."""
 
 
 @inlined

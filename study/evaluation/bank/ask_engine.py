@@ -16,12 +16,12 @@ from study.evaluation.bank.proof_folder import ANSWER, DIED, RECORDING, ProofFol
 from study.evaluation.bank.proof_seals import read_answer
 from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.text_file import read_text, write_text
-from study.workflows.pieces import finished_pieces
+from study.workflows.run_on_executor import finished_pieces
 
 PATIENCE_S = 1200.0
 """Longest wait for one case (s); a case takes seconds to a minute."""
 GLANCE_S = 0.5
-"""How often the calling thread checks that workers still run (s)."""
+"""Interval at which the calling thread checks that workers still run (s)."""
 TRIES = 2
 """Attempts per case: a process that died may have been killed from outside."""
 
@@ -143,7 +143,9 @@ def _engines(
     folder: ProofFolder, workers: int, left: SimpleQueue[str], answered: SimpleQueue[str]
 ) -> Iterator[list[threading.Thread]]:
     engines = [Engine(folder) for _ in range(workers)]
-    threads = [threading.Thread(target=_work, args=(each, folder, left, answered), daemon=True) for each in engines]
+    threads = [
+        threading.Thread(target=_run_worker, args=(each, folder, left, answered), daemon=True) for each in engines
+    ]
     for thread in threads:
         thread.start()
     try:
@@ -158,7 +160,7 @@ def _engines(
             engine.close()
 
 
-def _work(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
+def _run_worker(engine: Engine, folder: ProofFolder, left: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
     while True:
         try:
             name = left.get_nowait()

@@ -32,6 +32,7 @@ NEXT = "next"
 FURTHER = "recording_{}.h5"
 PROPOSED, DRAWN = "proposed", "drawn"
 NOISE_SEED = 7
+"""Keeps the noise and the random order of follow-ups apart from all other draws of a case."""
 
 
 def follow_up(
@@ -70,7 +71,7 @@ def follow_up(
         on_done(done, len(names))
 
     ask_engine(again, names, workers, on_answered)
-    return tuple(_found(again, each, label) for each, label in zip(starts, labels, strict=True))
+    return tuple(_follow_up_outcome(again, each, label) for each, label in zip(starts, labels, strict=True))
 
 
 def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcome) -> None:
@@ -117,7 +118,7 @@ def _write_case(
     }
 
 
-def _found(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
+def _follow_up_outcome(again: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
     def read_follow_up(which: str) -> tuple[str, tuple[str, ...]]:
         if which not in label:
             return "", ()

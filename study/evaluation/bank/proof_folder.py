@@ -37,7 +37,7 @@ class ProofFolder:
 
 
 RECORDING, MODEL, SETTINGS, ANSWER = "recording.h5", "model.toml", "settings.json", "answer.json"
-"""In a case's folder under `open`; the last is what the diagnosis adds."""
+"""Files in a case's folder under `open`; the last is written by the diagnosis."""
 DIED = "died"
 """Key in an answer that was written because the worker process died."""
 CLEAN = "clean"

@@ -89,12 +89,12 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
         )
         controls = _controls(path, plan, options, on_progress)
     return Proof(
-        folder, plan, seal, outcomes, score(outcomes, followed), engines(folder, names), _beside(path), controls,
+        folder, plan, seal, outcomes, score(outcomes, followed), engines(folder, names), _other_digests(path), controls,
         followed, plan.cases - len(numbers),
     )  # fmt: skip
 
 
-def _beside(path: Path) -> tuple[str, ...]:
+def _other_digests(path: Path) -> tuple[str, ...]:
     """Digests of the code that answered follow-ups and controls."""
     folders = [ProofFolder(path / NEXT), *(ProofFolder(each) for each in sorted(path.glob("controls/*")))]
     found = {

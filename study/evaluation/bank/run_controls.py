@@ -47,7 +47,9 @@ def run_controls(
     ask_engine(folder, every, workers, on_answered)
     return tuple(
         judge_control(
-            f"{control.name}, seed {seed}", control.claim, [_said(folder.open / name) for name in names[control.name]]
+            f"{control.name}, seed {seed}",
+            control.claim,
+            [_read_answer(folder.open / name) for name in names[control.name]],
         )
         for control in controls
     )
@@ -85,6 +87,6 @@ def _write(place: Path, asked: ControlInput) -> None:
     write_text(place / SETTINGS, json.dumps({"without": list(asked.without)}) + "\n", overwrite=True)
 
 
-def _said(place: Path) -> Diagnosis | None:
+def _read_answer(place: Path) -> Diagnosis | None:
     answer = read_answer(place)
     return None if "failed" in answer else diagnosis_from_json(answer["diagnosis"])

@@ -1,4 +1,9 @@
-"""Write a bank's cases as files: open inputs for the diagnosis, and the truth under a seal that is made first."""
+"""Draws the cases of a bank and writes them: open inputs for the diagnosis, and sealed labels with the truth.
+
+A seal is a commitment by hash: the SHA-256 of every label is written, and can be published, before any case is
+diagnosed; so that truth and answers cannot be changed to suit each other. Labels hold a random salt, or the few
+possible truths could be found by trying their hashes.
+"""
 
 import json
 import secrets
@@ -36,6 +41,7 @@ def truths(case: Case) -> list[dict[str, Any]]:
 
 
 SALT_BYTES = 16
+"""Random bytes in a label: too many to be found by trying."""
 PROCESSOR_S = 60.0
 """Processor time for the search in one case (s); the best result so far is then the answer."""
 
@@ -60,11 +66,11 @@ def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Cal
     """Draw, write and seal the missing cases, calling `on_sealed(count)`. Returns the SHA-256 of labels.sha256, to
     be published before anything is diagnosed. Raises StudyError."""
     drawn = drawable_cases(plan)
-    left = [each for each in drawn if not folder.label(each.number).exists()]
-    done = len(drawn) - len(left)
+    missing = [each for each in drawn if not folder.label(each.number).exists()]
+    done = len(drawn) - len(missing)
     on_sealed(done)
-    with worker_processes(workers if len(left) > 1 else 1) as pool:
-        for finished in as_completed([pool.submit(seal_one, folder, each) for each in left]):
+    with worker_processes(workers if len(missing) > 1 else 1) as pool:
+        for finished in as_completed([pool.submit(seal_one, folder, each) for each in missing]):
             finished.result()
             done += 1
             on_sealed(done)

@@ -67,8 +67,8 @@ def _silent_input(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
     noise = np.array(NOISE_MPS2)[list(rig.axes)] * random.normal(size=shape)
     recording = replace(
         case.recording,
-        command=_with(case.recording.command, np.zeros(shape)),
-        response=_with(case.recording.response, noise),
+        command=_replace_samples(case.recording.command, np.zeros(shape)),
+        response=_replace_samples(case.recording.response, noise),
         position=None,
         segments=(),
     )
@@ -142,13 +142,13 @@ def _map_samples(recording: Recording, how: Callable[[FloatArray], FloatArray], 
     position = recording.position
     return replace(
         recording,
-        command=_with(recording.command, how(recording.command.samples)) if command else recording.command,
-        response=_with(recording.response, how(recording.response.samples)),
-        position=None if position is None else _with(position, how(position.samples)),
+        command=_replace_samples(recording.command, how(recording.command.samples)) if command else recording.command,
+        response=_replace_samples(recording.response, how(recording.response.samples)),
+        position=None if position is None else _replace_samples(position, how(position.samples)),
     )
 
 
-def _with(signal: Signal, samples: FloatArray) -> Signal:
+def _replace_samples(signal: Signal, samples: FloatArray) -> Signal:
     return Signal(samples, signal.sample_rate_hz, signal.quantity, signal.unit, signal.channels)
 
 

@@ -1,7 +1,7 @@
 """Contents of a bank: the case drawn for each number, so that any part of it is a fair sample of the whole.
 
 Of every forty: ten with nothing missing, eighteen with one effect, four with two, four outside the catalogue, and four
-where the diagnosis must do without the true effect. One in eight has more hidden extras, one in eight comes from a
+where the diagnosis must do without the true effect. One in eight has more concealed extras, one in eight comes from a
 second physics engine.
 """
 
@@ -94,7 +94,7 @@ def _effects(
     if kind == "nothing":
         return (), ()
     if kind == "pair":
-        return _pair(random), tuple(float(each) for each in random.uniform(lowest, 1.0, 2))
+        return _draw_pair(random), tuple(float(each) for each in random.uniform(lowest, 1.0, 2))
     names = tuple(DECOYS if kind == "outside" else second_engine.EFFECTS if bank == "engine" else EFFECTS)
     own = [seed, 3, sorted(LOWEST).index(kind), sorted(EXTRAS).index(bank)]
     order = np.random.default_rng(own).permutation(len(names))
@@ -104,7 +104,7 @@ def _effects(
     return (names[which],), (float(lowest + (1.0 - lowest) * share),)
 
 
-def _pair(random: np.random.Generator) -> tuple[str, str]:
+def _draw_pair(random: np.random.Generator) -> tuple[str, str]:
     while True:
         first, second = (str(name) for name in random.choice(list(EFFECTS), 2, replace=False))
         if not any({first, second} <= row for row in ONE_ROW):

@@ -11,22 +11,22 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext
 from study.evaluation.challenge.device import Device, motion
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ, DrivePlan, draw_plan
 from study.evaluation.challenge.effects import actuator, decoys, friction, hand, inertia_and_drag, sensor, springs
 from study.evaluation.challenge.extras import with_extras
-from study.evaluation.challenge.hidden import EffectContext, HiddenEffect
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import WHOLE, Rig
 from study.evaluation.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read
 
-EFFECTS: dict[str, HiddenEffect] = {
+EFFECTS: dict[str, ConcealedEffect] = {
     effect.name: effect
     for group in (friction, springs, inertia_and_drag, hand, actuator, sensor)
     for effect in group.EFFECTS
 }
 """All effects of the vocabulary."""
-DECOYS: dict[str, HiddenEffect] = {effect.name: effect for effect in decoys.DECOYS}
+DECOYS: dict[str, ConcealedEffect] = {effect.name: effect for effect in decoys.DECOYS}
 """Effects outside the vocabulary."""
 
 Concealed = Literal["calibrated", "retuned"]
@@ -82,16 +82,16 @@ def draw_case(
     Raises ValueError for an unknown name, a strength outside 0..1, or a hand with a re-tuned model, which would absorb
     the hand into the device.
     """
-    hidden = [_find_effect(effect) for effect in effects]
-    if concealed == "retuned" and any(effect.name == "hand_impedance" for effect in hidden):
+    chosen = [_find_effect(effect) for effect in effects]
+    if concealed == "retuned" and any(effect.name == "hand_impedance" for effect in chosen):
         raise ValueError("a hand can be concealed from a calibrated model only: a re-tuned one contains it")
-    random = np.random.default_rng([seed, len(hidden)])
+    random = np.random.default_rng([seed, len(chosen)])
     bench, plan = draw_bench(random), draw_plan(random, rig)
     bare = with_extras(Device(bench, steps=rig.steps), rig.extras, seed)
-    strengths = _strengths(strength, len(hidden), random)
+    strengths = _strengths(strength, len(chosen), random)
     free = motion(bare, plan.command)
-    device, truth = _conceal(bare, free, (hidden, strengths), random, rig)
-    moved = motion(device, plan.command) if hidden else free
+    device, truth = _conceal(bare, free, (chosen, strengths), random, rig)
+    moved = motion(device, plan.command) if chosen else free
     response, position = read(device.sensor, *moved, RATE_HZ, random)
     if concealed == "calibrated":
         known, tolerance = draw_calibration(bench, random, rig.axes)
@@ -107,7 +107,7 @@ def draw_case(
         readings = read(device.sensor, *motion(heavier, further.command), RATE_HZ, np.random.default_rng([seed, noise]))
         return replace(make_recording(label, further, *readings, rig), meta=added_mass_meta(added_kg))
 
-    return Case(recording, model, truth, again, visibility(bare, device, (free, moved), rig) if hidden else 0.0)
+    return Case(recording, model, truth, again, visibility(bare, device, (free, moved), rig) if chosen else 0.0)
 
 
 def visibility(bare: Device, device: Device, moved: MotionPair, rig: Rig) -> float:
@@ -122,7 +122,7 @@ def visibility(bare: Device, device: Device, moved: MotionPair, rig: Rig) -> flo
     return float(np.sqrt(power.max()))
 
 
-def _find_effect(name: str) -> HiddenEffect:
+def _find_effect(name: str) -> ConcealedEffect:
     found = EFFECTS.get(name) or DECOYS.get(name)
     if found is None:
         raise ValueError(f"there is no way to conceal '{name}'; known are {', '.join((*EFFECTS, *DECOYS))}")
@@ -139,16 +139,16 @@ def _strengths(given: float | Sequence[float] | None, count: int, random: np.ran
 def _conceal(
     device: Device,
     free: tuple[FloatArray, FloatArray],
-    wanted: tuple[Sequence[HiddenEffect], FloatArray],
+    wanted: tuple[Sequence[ConcealedEffect], FloatArray],
     random: np.random.Generator,
     rig: Rig,
 ) -> tuple[Device, tuple[Truth, ...]]:
     """Draw the parameters of the effects and build them into the device. free: acceleration and position without
     them."""
-    (hidden, strengths), (acceleration, position) = wanted, free
+    (chosen, strengths), (acceleration, position) = wanted, free
     bench, truth = device.bench, []
     peak = np.minimum(np.abs(acceleration).max(axis=0), RANGE_MPS2)
-    for effect, strength in zip(hidden, strengths, strict=True):
+    for effect, strength in zip(chosen, strengths, strict=True):
         axis = rig.axes[int(random.integers(len(rig.axes)))]
         travel = np.abs(position).max(axis=0)
         at = EffectContext(random, float(strength), bench, axis, travel, peak, rig.axes)
@@ -170,7 +170,7 @@ def added_mass_meta(added_kg: float) -> dict[str, float]:
     return {"added_mass_kg": added_kg} if added_kg else {}
 
 
-def truth_of(effect: HiddenEffect, axis: int, values: dict[str, float]) -> Truth:
+def truth_of(effect: ConcealedEffect, axis: int, values: dict[str, float]) -> Truth:
     """The label of one concealed effect."""
     known = EFFECTS_BY_NAME.get(effect.name)
     names = set(values) if known is None else {parameter.name for parameter in known.parameters}

@@ -15,10 +15,13 @@ LEVELS_N = (0.5, 1.5, 3.0)
 """Peaks of the multisines."""
 PERIOD, PERIODS, TEST_PERIODS = 2000, 4, 2
 REST = 500
+"""Samples of rest between two segments."""
 FIRST_LINE, LAST_LINE = 3, 479
 """Lines of a 2 s period: 1.5 to 239.5 Hz, odd lines only."""
 SWEEP_N, SWEEP_HZ, SWEEP_SAMPLES, SWEEP_FADE = 1.8, (1.0, 240.0), 6000, 200
+"""Swept sines of the test: peak, first and last frequency, samples, and samples of each fade."""
 SLOW_N, SLOW_HZ, SLOW_SAMPLES, SLOW_FADE = 1.6, (0.9, 1.3, 2.1), 4000, 500
+"""Slow sines of the test, for large motions: peak, frequency per axis, samples, and samples of each fade."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,14 +61,14 @@ def draw_plan(random: np.random.Generator, rig: Rig = WHOLE) -> DrivePlan:
     for axis in rig.axes:
         for level_n in LEVELS_N:
             wave = np.tile(multisine(random, level_n, rig.period), rig.periods)
-            add(_along(axis, wave), "multisine", level_n, rig.period, "fit")
+            add(_place_on_axis(axis, wave), "multisine", level_n, rig.period, "fit")
     for axis in rig.axes:
-        add(_along(axis, _sweep(rig.along(SWEEP_SAMPLES))), "sweep", SWEEP_N, 0, "test")
+        add(_place_on_axis(axis, _sweep(rig.along(SWEEP_SAMPLES))), "sweep", SWEEP_N, 0, "test")
     together = np.zeros((rig.period, 3))
     for axis in rig.axes:
         together[:, axis] = multisine(random, LEVELS_N[1], rig.period)
     add(np.tile(together, (TEST_PERIODS, 1)), "multisine", LEVELS_N[1], rig.period, "test")
-    add(_slow(rig), "slow", SLOW_N, 0, "test")
+    add(_slow_sines(rig), "slow", SLOW_N, 0, "test")
     if rig.loud_n:
         loud = np.zeros((rig.period, 3))
         for axis in rig.axes:
@@ -74,7 +77,7 @@ def draw_plan(random: np.random.Generator, rig: Rig = WHOLE) -> DrivePlan:
     return DrivePlan(np.vstack(blocks), tuple(segments))
 
 
-def _along(axis: int, wave: FloatArray) -> FloatArray:
+def _place_on_axis(axis: int, wave: FloatArray) -> FloatArray:
     block = np.zeros((len(wave), 3))
     block[:, axis] = wave
     return block
@@ -90,7 +93,7 @@ def _sweep(samples: int) -> FloatArray:
     return wave
 
 
-def _slow(rig: Rig) -> FloatArray:
+def _slow_sines(rig: Rig) -> FloatArray:
     """All axes at once, each at its own frequency; no fade-out at the end."""
     samples = np.arange(rig.along(SLOW_SAMPLES))
     rise = np.minimum(samples / SLOW_FADE, 1.0)

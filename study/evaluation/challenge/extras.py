@@ -15,6 +15,7 @@ from study.evaluation.challenge.handle_force_kernel import CUBE, DRAG, PHASE, PI
 
 Extra = Callable[[Device, float, np.random.Generator], Device]
 COUNT = 4
+"""Unlabelled effects per device."""
 
 
 def with_extras(device: Device, factor: float, seed: int) -> Device:

@@ -13,7 +13,7 @@ COLUMNS = 7
     SPEED_POWER, PLACE_POWER, PLACE_DRAG, SPEED_SPRING, ATTRACTION, SOFT_DRAG, SOFT_SPRING, FADING_DRAG, CONTACT,
     EDGE_DRAG, GAIN_RIPPLE, PUMPED, RELAXATION, HEATING, CROSS_SQUARE, CROSS_SPRING, CROSS_DRAG, WHIRL, ALL_DRAG,
 ) = range(19)  # fmt: skip
-"""Kinds: of the axis's own motion, then with more, then across; `LAW_KINDS` in `hidden_laws` says what each is."""
+"""Kinds: of the axis's own motion, then with more, then across; `LAW_KINDS` in `concealed_laws` says what each is."""
 
 
 @njit(cache=True, nogil=True)
@@ -24,11 +24,11 @@ def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, 
         return _across(row, q[j], v[j], q[k], v[k])
     if kind >= GAIN_RIPPLE:
         return _with_more(row, q[j], drive[j], kept, t)
-    return _along(row, q[j], v[j])
+    return _own_motion_force(row, q[j], v[j])
 
 
 @njit(cache=True, nogil=True)
-def _along(row: FloatArray, x: float, speed: float) -> float:
+def _own_motion_force(row: FloatArray, x: float, speed: float) -> float:
     """Laws of the axis's own position and velocity."""
     kind, first, side = int(row[KIND]), row[FIRST], row[SIDE]
     if kind == SPEED_POWER:

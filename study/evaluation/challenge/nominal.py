@@ -63,7 +63,7 @@ def retune(
             each = [(predicted(shift + h * unit) - here).ravel() / h for h, unit in zip(steps, np.eye(9), strict=True)]
             slopes = np.column_stack(each) * free
         change = np.linalg.lstsq(slopes, (wanted - here).ravel(), rcond=None)[0]
-        shift = _within(shift + change, bench)
+        shift = _limit_shift(shift + change, bench)
         if np.abs(change / steps).max() < 0.05:
             break
     return shift_diagonals(bench, shift), WIDE
@@ -99,7 +99,7 @@ def _linear_response(bench: Bench, command: FloatArray) -> FloatArray:
     return smoothed
 
 
-def _within(shift: FloatArray, bench: Bench) -> FloatArray:
+def _limit_shift(shift: FloatArray, bench: Bench) -> FloatArray:
     """Limit the shift: at least half of the mass and a tenth of damping and stiffness remain."""
     lowest = np.concatenate(
         [-0.5 * np.diag(bench.mass), -0.9 * np.diag(bench.damping), -0.9 * np.diag(bench.stiffness)]

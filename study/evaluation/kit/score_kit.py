@@ -31,8 +31,9 @@ class KitScore:
 
 
 def score_kit(path: Path, diagnoses: Path, out: Path, seal: str | None = None) -> KitScore:
-    """diagnoses: a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed over
-    before the diagnoses; None compares with the file beside the table alone. Raises StudyError."""
+    """Score a laboratory's diagnoses against its revealed table. diagnoses: a folder per recording, as `hapteq diagnose
+    --out` writes them. seal: the hash that was handed over before the diagnoses; None compares with the file beside the
+    table alone. Raises StudyError."""
     digest = sha256_of(path)
     compared_with = _require_sealed(path, digest, seal)
     labels = read_labels(path)

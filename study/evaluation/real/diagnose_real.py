@@ -1,4 +1,11 @@
-"""Diagnose one real recording: import it, compare it with a simple model, test the result on further recordings."""
+"""Diagnosis of one recording of a real device.
+
+1. The recording is imported by its map. Its model is the map's, or a linear model or force balance fitted to it.
+2. `diagnose` searches for missing effects. Where a recording from before a known change exists, it is the reference.
+3. The resulting model is tested on further recordings, to which nothing is fitted but, where the map says so, a gain.
+
+A recording that cannot be diagnosed gets an answer all the same: refused, with the reason.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -44,7 +51,7 @@ class RealDiagnosis:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Read:
+class _ImportedCase:
     """The imported recording and what its diagnosis needs."""
 
     recording: Recording
@@ -52,6 +59,7 @@ class _Read:
     balances: tuple[Balance, ...] | None
     remarks: tuple[str, ...]
     before: Recording | None
+    """Recording of the same device before the change, where there is one."""
 
 
 def report_crash(wanted: RealRecording, crash: Exception) -> RealDiagnosis:
@@ -68,35 +76,35 @@ def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on
     UserInterruptError."""
     parents = wanted.parents
     try:
-        read = _read(wanted, (time_left, guard), on_progress)
+        case = _import_case(wanted, (time_left, guard), on_progress)
         settings = DiagnosisSettings(
             names=(wanted.name,),
-            clean=() if read.before is None else (read.before,),
+            clean=() if case.before is None else (case.before,),
             fitted=wanted.model() is None,
-            balances=read.balances,
+            balances=case.balances,
             time_left=time_left,
             guard=guard,
         )
-        found = diagnose((read.recording,), read.model, settings, map_forked, on_progress)
-        found = replace(found, remarks=(*read.remarks, *found.remarks))
+        found = diagnose((case.recording,), case.model, settings, map_forked, on_progress)
+        found = replace(found, remarks=(*case.remarks, *found.remarks))
         diagnosis = wanted.found.source.map.diagnosis
         names = (wanted.folder.name, wanted.name, wanted.found.source.map.title)
-        answer = answer_of_findings(found, read.recording, names, diagnosis.nominal)
+        answer = answer_of_findings(found, case.recording, names, diagnosis.nominal)
     except StudyError as refusal:
         return RealDiagnosis(_refusal(wanted, f"{refusal.title}: {refusal.happened}"), None, parents)
     except (NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         return RealDiagnosis(_refusal(wanted, f"The fits broke down: {refusal}."), None, parents)
-    further = tuple(_further(each, wanted, found) for each in wanted.tests)
-    pair = None if read.before is None else _pair(wanted, read, found)
+    further = tuple(_test_on_further(each, wanted, found) for each in wanted.tests)
+    pair = None if case.before is None else _before_and_after(wanted, case, found)
     objections = (
         *diagnosis.objections,
         *(objection for each in wanted.tests for objection in each.source.map.diagnosis.objections),
     )
     answer = replace(answer, further=further, pair=pair, objections=objections)
-    return RealDiagnosis(answer if pair is None else _not_whole(answer, pair), found, parents)
+    return RealDiagnosis(answer if pair is None else _downgrade_if_remainder(answer, pair), found, parents)
 
 
-def _not_whole(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
+def _downgrade_if_remainder(answer: RealAnswer, pair: PairOutcome) -> RealAnswer:
     """Downgrade "explained" to "partly explained" where the recording made before the change shows a remainder
     beyond what the model missed then: a single reference recording leaves wide uncertainty."""
     left, missed = pair.with_effects, pair.expected_left
@@ -115,7 +123,7 @@ def import_real_recording(found: FoundMap) -> Recording:
     return all_as_force_driven([recording])[0]
 
 
-def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: Progress) -> _Read:
+def _import_case(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: Progress) -> _ImportedCase:
     """Import the recording, its model and the recording made before. Raises StudyError where there is nothing to
     diagnose."""
     on_progress("importing", 0.0)
@@ -131,7 +139,7 @@ def _read(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_progress: 
     recording = every.recordings[0]
     first = _model(wanted, recording, bounds, on_progress)
     remarks = (*ready.remarks, *every.remarks, *first.remarks)
-    return _Read(recording, first.model, first.balances, remarks, every.recordings[1] if before else None)
+    return _ImportedCase(recording, first.model, first.balances, remarks, every.recordings[1] if before else None)
 
 
 def _is_plain(wanted: RealRecording) -> bool:
@@ -187,7 +195,7 @@ def _refusal(wanted: RealRecording, answer: str) -> RealAnswer:
     )
 
 
-def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherTest:
+def _test_on_further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherTest:
     """Test on a further recording; nothing is fitted to it except, where the map says so, its gain. The models are as
     recorded, so that the direction in which commands are counted was decided once, for all recordings of the device."""
     title, free = test.source.map.title, test.source.map.diagnosis.volume_free
@@ -203,13 +211,16 @@ def _further(test: FoundMap, wanted: RealRecording, found: Findings) -> FurtherT
         return FurtherTest(test.name, title, "", None, None, problem=text)
     without, with_it = (each.with_gain if free else each.as_it_is for each in (retuned, after))
     text = after.error + (", one factor fitted" if free else "")
-    stretches = () if free or after.error == "predicted force" else _whole(test.name, recording, retuned, after)
+    stretches = (
+        () if free or after.error == "predicted force" else _stretch_of_whole(test.name, recording, retuned, after)
+    )
     return FurtherTest(test.name, title, text, without, with_it, stretches)
 
 
-def _whole(
+def _stretch_of_whole(
     name: str, recording: Recording, retuned: PredictionError, after: PredictionError
 ) -> tuple[HeldOutStretch, ...]:
+    """The whole recording as one held-out stretch per channel, with the errors of both models."""
     seconds = len(recording) / recording.sample_rate_hz
     return tuple(
         HeldOutStretch(name, channel.name, channel.unit, 0.0, seconds, channel.signal, channel.left, two.left)
@@ -222,10 +233,10 @@ def _require_retuned(found: Findings) -> MechanicalModel:
     return found.retuned
 
 
-def _pair(wanted: RealRecording, read: _Read, found: Findings) -> PairOutcome:
-    assert wanted.before is not None and read.before is not None
-    given = prediction_error(read.recording, read.model, "test")
-    missed = prediction_error(read.before, read.model, "test")
+def _before_and_after(wanted: RealRecording, case: _ImportedCase, found: Findings) -> PairOutcome:
+    assert wanted.before is not None and case.before is not None
+    given = prediction_error(case.recording, case.model, "test")
+    missed = prediction_error(case.before, case.model, "test")
     errors = found.diagnosis.fit.test
     return PairOutcome(
         changed=wanted.changed,

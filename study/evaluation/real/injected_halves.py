@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.contrast.bases import bases_of
+from analysis.diagnosis.contrast.compared_base import Base
 from analysis.diagnosis.contrast.joint_products import weights_of
 from analysis.diagnosis.contrast.part import Part, split_into_parts
-from analysis.diagnosis.contrast.stream import Base
 from analysis.diagnosis.data.observed_parts import part_of, parts_of
 from equalizer.signals.joining import concatenate, concatenate_if_all
 from equalizer.signals.recording import Recording, Segment

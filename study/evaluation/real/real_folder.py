@@ -79,13 +79,13 @@ def read_real_folder(folder: Path) -> RealFolder:
         try:
             found = _recordings(each, find_map(each) or (map_by_header(each),))
         except (StudyError, OSError) as problem:
-            troubles.append(Trouble(each.name, _said(problem)))
+            troubles.append(Trouble(each.name, _problem_text(problem)))
             continue
         recordings += found
     return RealFolder(tuple(recordings), tuple(troubles))
 
 
-def _said(problem: StudyError | OSError) -> str:
+def _problem_text(problem: StudyError | OSError) -> str:
     return problem.happened if isinstance(problem, StudyError) else f"{problem.strerror or problem}."
 
 
@@ -95,7 +95,7 @@ def _recordings(folder: Path, found: Sequence[FoundMap]) -> list[RealRecording]:
         if each.source.map.diagnosis.tests and any(_tests(each, other) for other in found):
             continue
         tests = tuple(other for other in found if _tests(other, each))
-        before, changed = _pair(each, found)
+        before, changed = _find_pair(each, found)
         made.append(RealRecording(folder, each, tests, before, changed))
     return made
 
@@ -112,15 +112,16 @@ def _tests(test: FoundMap, base: FoundMap) -> bool:
     return wanted == base.source.name and (not base.source.map.separate or alike)
 
 
-def _pair(found_map: FoundMap, found: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
+def _find_pair(found_map: FoundMap, found: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
     for pair in found_map.source.map.diagnosis.pair:
         if found_map.files[0].match(pair.after):
             before = next(
-                (other for other in found if other.source is found_map.source and _is(other, pair.before)), None
+                (other for other in found if other.source is found_map.source and _fits_pattern(other, pair.before)),
+                None,
             )
             return before, pair.changed if before is not None else ""
     return None, ""
 
 
-def _is(found: FoundMap, pattern: str) -> bool:
+def _fits_pattern(found: FoundMap, pattern: str) -> bool:
     return found.files[0].match(pattern)

@@ -19,14 +19,14 @@ from study.errors import StudyError, UserInterruptError, WrongUseError, resumabl
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
 from study.evaluation.real.inject_real import carriers, run_injections
-from study.evaluation.real.kept_answers import (
+from study.evaluation.real.real_folder import RealFolder, RealRecording, read_real_folder
+from study.evaluation.real.reuse_answers import (
     ANSWER_NAME,
     INJECTED_NAME,
     answer_place,
-    kept_answers,
     origin_of_answer,
+    reusable_answers,
 )
-from study.evaluation.real.real_folder import RealFolder, RealRecording, read_real_folder
 from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_time
@@ -38,8 +38,8 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.real_answer_file import read_answer_and_origin, write_real_answer
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
-from study.workflows.forked_map import processor_s, unforked
-from study.workflows.pieces import finished_pieces
+from study.workflows.forked_map import processor_s, without_forking
+from study.workflows.run_on_executor import finished_pieces
 
 RETUNED_NAME = "retuned.toml"
 DIAGNOSED_OF_BOTH = 0.5
@@ -82,9 +82,9 @@ def diagnose_folder(
             "Leave --seconds out: searches then end by a count of evaluations, the same on every machine.",
             saved="Nothing was written.",
         )
-    found = _found(plan)
+    found = _take_inventory(plan)
     time = clock or RealClock()
-    kept = kept_answers(plan.out, found.recordings, plan.seconds)
+    kept = reusable_answers(plan.out, found.recordings, plan.seconds)
     _make_writable(plan.out)
     saved = f"What was answered so far is in {plan.out}."
     with resumable("Not all recordings were diagnosed.", saved, also=(UserInterruptError,)):
@@ -99,7 +99,7 @@ def diagnose_folder(
         )
 
 
-def _found(plan: RealPlan) -> RealFolder:
+def _take_inventory(plan: RealPlan) -> RealFolder:
     """The inventory. Raises StudyError where there is nothing to diagnose, or no time for it."""
     if plan.seconds is not None and not math.isfinite(plan.seconds):
         raise WrongUseError(
@@ -187,7 +187,7 @@ def _sent_answers(
 
 def answer_sent_recording(folder: str, name: str, files: Files) -> Files:
     """Runs on a worker: the results of one recording. folder, files: the sub-folder that it lies in."""
-    with TemporaryDirectory() as place, unforked():
+    with TemporaryDirectory() as place, without_forking():
         plan = RealPlan(Path(place) / "recordings", Path(place) / "out")
         write_files(plan.folder / folder, files)
         found = read_real_folder(plan.folder)

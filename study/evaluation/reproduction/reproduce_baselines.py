@@ -12,7 +12,7 @@ from equalizer.tracking.feedforward.baselines import Inverse
 from equalizer.tracking.feedforward.comparison import baseline_inverses
 from equalizer.tracking.workspace.blended_inverse import blend_at
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, blending_driver, single_model_driver
-from study.evaluation.reproduction.reproduce_playback import Driver, Playing, play_row
+from study.evaluation.reproduction.reproduce_playback import Driver, PlaybackRow, play_row
 from study.evaluation.reproduction.reproduction_plan import CENTRE, EDGE, Place, ReproductionPlan
 
 
@@ -43,7 +43,9 @@ def play_baselines(
     found: list[PlayedResponse] = []
     for where in _PLACEMENTS:
         for inverse in inverses:
-            playing = Playing(f"{inverse.name}, {where.words}", _driver(plan, inverse), where.place_m, hand=where.hand)
+            playing = PlaybackRow(
+                f"{inverse.name}, {where.words}", _driver(plan, inverse), where.place_m, hand=where.hand
+            )
             played = replace(play_row(plan, playing), multiply_adds=inverse.multiply_adds)
             found.append(played)
             on_share(len(found) / wanted)
@@ -52,12 +54,14 @@ def play_baselines(
     return tuple(found)
 
 
-def _for_the_place(where: _Placement, models: PlacedModels) -> tuple[Playing, ...]:
+def _for_the_place(where: _Placement, models: PlacedModels) -> tuple[PlaybackRow, ...]:
     if where.hand:
-        return (Playing("model identified in the hand", single_model_driver(models.hand), hand=True),)
+        return (PlaybackRow("model identified in the hand", single_model_driver(models.hand), hand=True),)
     if where.place_m == EDGE:
         return (
-            Playing("models of other places, blended, edge", blending_driver(blend_at(models.workspace, EDGE)), EDGE),
+            PlaybackRow(
+                "models of other places, blended, edge", blending_driver(blend_at(models.workspace, EDGE)), EDGE
+            ),
         )
     return ()
 

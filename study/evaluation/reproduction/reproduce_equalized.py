@@ -14,7 +14,7 @@ from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 from equalizer.tracking.workspace.workspace_models import WorkspaceModels
 from study.devices.opening import FRICTIONLESS
-from study.evaluation.reproduction.reproduce_playback import Driver, Playing, not_equalized, play_row
+from study.evaluation.reproduction.reproduce_playback import Driver, PlaybackRow, not_equalized, play_row
 from study.evaluation.reproduction.reproduction_plan import EDGE, ReproductionPlan
 
 
@@ -70,23 +70,23 @@ def blending_driver(models: ModelsAtPlace) -> Driver:
     return drive
 
 
-def _playings(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playing]:
+def _playings(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, PlaybackRow]:
     centre = single_model_driver(models.centre)
     slick = single_model_driver(models.frictionless)
     return {
-        "plain": Playing("Not equalized, centre", not_equalized),
-        "equalized": Playing("Equalized, centre", centre),
-        "edge_plain": Playing("Not equalized, edge", not_equalized, EDGE),
-        "edge": Playing("Edge, model of the centre", centre, EDGE),
-        "edge_blended": Playing("Edge, models blended (ours)", blending_driver(blended), EDGE),
-        "broad_plain": Playing("Not equalized, centre, all frequencies", not_equalized, signal="multisine"),
-        "broad": Playing("Equalized, centre, all frequencies", centre, signal="multisine"),
-        "edge_broad": Playing(
+        "plain": PlaybackRow("Not equalized, centre", not_equalized),
+        "equalized": PlaybackRow("Equalized, centre", centre),
+        "edge_plain": PlaybackRow("Not equalized, edge", not_equalized, EDGE),
+        "edge": PlaybackRow("Edge, model of the centre", centre, EDGE),
+        "edge_blended": PlaybackRow("Edge, models blended (ours)", blending_driver(blended), EDGE),
+        "broad_plain": PlaybackRow("Not equalized, centre, all frequencies", not_equalized, signal="multisine"),
+        "broad": PlaybackRow("Equalized, centre, all frequencies", centre, signal="multisine"),
+        "edge_broad": PlaybackRow(
             "Edge, models blended (ours), all frequencies", blending_driver(blended), EDGE, signal="multisine"
         ),
-        "slick_plain": Playing("Not equalized, centre, without friction", not_equalized, device=FRICTIONLESS),
-        "slick": Playing("Equalized, centre, without friction", slick, device=FRICTIONLESS),
-        "frictionless": Playing(
+        "slick_plain": PlaybackRow("Not equalized, centre, without friction", not_equalized, device=FRICTIONLESS),
+        "slick": PlaybackRow("Equalized, centre, without friction", slick, device=FRICTIONLESS),
+        "frictionless": PlaybackRow(
             "Equalized, centre, all frequencies, without friction", slick, device=FRICTIONLESS, signal="multisine"
         ),
     }
@@ -97,13 +97,13 @@ def single_model_driver(model: IdentifiedModel) -> Driver:
     return lambda wanted: periodic_command(model, wanted).samples
 
 
-def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, Playing], tuple[str, ...]]:
+def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRow], tuple[str, ...]]:
     """The row with modal interpolation, or a remark where the modes do not match."""
     try:
         at_edge = modal_interpolation(workspace).at(EDGE)
     except ModesDoNotMatchError as doubt:
         return {}, (f"No modes were interpolated: {doubt}.",)
-    playing = Playing("Edge, modes interpolated (ours)", blending_driver(at_edge), EDGE)
+    playing = PlaybackRow("Edge, modes interpolated (ours)", blending_driver(at_edge), EDGE)
     return {"edge_modal": playing}, at_edge.remarks
 
 

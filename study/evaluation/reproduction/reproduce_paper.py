@@ -29,7 +29,7 @@ from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 from study.workflows.results.analyze_data import sensor_frame
 from study.workflows.results.collect_sessions import collect_sessions
-from study.workflows.results.collected import Collected
+from study.workflows.results.collected import CollectedTrials
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
 
 
@@ -54,7 +54,7 @@ def identify_or_load(
     """Load the cached model, or identify it; a cached file of another recording, order or band, or without its
     quality, is replaced."""
     path = plan.models / recorded.path.name
-    model = _kept(path, plan, recorded.path)
+    model = _load_cached_model(path, plan, recorded.path)
     if model is None:
         path.unlink(missing_ok=True)
         asked = IdentifyPlan((recorded.path,), path, plan.band_hz, plan.order, with_spring=True)
@@ -63,7 +63,7 @@ def identify_or_load(
     return ReproducedModel(model, validate_on_test(model, (from_excitation(recorded.recording),)))
 
 
-def _kept(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel | None:
+def _load_cached_model(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel | None:
     try:
         model = read_identified_model(path) if path.exists() else None
     except UnusableFileError:
@@ -94,7 +94,7 @@ def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]
     with resumable("The reproduction is not finished.", saved, also=(UserInterruptError,)):
         _make_folders(plan)
         recordings = {name: record_or_load(plan, each, steps.of(f"recording {name}")) for name, each in wanted.items()}
-        collected = _sit(plan, steps)
+        collected = _rehearse_study(plan, steps)
         identified = {name: identify_or_load(plan, recordings[name], steps.of(f"model {name}")) for name in models}
         results = _results(plan, recordings, identified, collected, steps)
         return write_reproduction_folder(plan, results, steps.of("writing"))
@@ -142,7 +142,7 @@ def _make_folders(plan: ReproductionPlan) -> None:
             raise CannotWriteError(folder, problem) from problem
 
 
-def _sit(plan: ReproductionPlan, steps: Steps) -> Collected:
+def _rehearse_study(plan: ReproductionPlan, steps: Steps) -> CollectedTrials:
     source = read_study_protocol(plan.protocols.study, plan.study)
     rehearsal = Rehearsal(source.protocol, source.text, subjects=plan.subjects, seed=plan.seed, data=plan.study)
     tell = steps.of("study")
@@ -154,7 +154,7 @@ def _results(
     plan: ReproductionPlan,
     recordings: Mapping[str, CachedRecording],
     identified: Mapping[str, ReproducedModel],
-    collected: Collected,
+    collected: CollectedTrials,
     steps: Steps,
 ) -> Results:
     models = PlacedModels(

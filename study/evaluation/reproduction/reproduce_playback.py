@@ -28,14 +28,16 @@ PEAK_OVER_CAP = 0.93
 PERIODS = 2
 """Periods played; the first lets the transient decay."""
 FADE_S = 0.5
+"""Fade at the start of the periodic forces (s)."""
 WAVE_SEED = 5
+"""Seed of the wanted wave, the same for all methods."""
 
 Driver = Callable[[Signal], FloatArray]
 """Maps one period of wanted accelerations (period, 3) to forces."""
 
 
 @dataclass(frozen=True, slots=True)
-class Playing:
+class PlaybackRow:
     """One row of the figure: place, device, and how the wanted signal is converted to forces."""
 
     name: str
@@ -51,7 +53,7 @@ def not_equalized(wanted: Signal) -> FloatArray:
     return wanted.samples
 
 
-def play_row(plan: ReproductionPlan, playing: Playing) -> PlayedResponse:
+def play_row(plan: ReproductionPlan, playing: PlaybackRow) -> PlayedResponse:
     """Play one row. Raises DeviceError, or StudyError where the device does not report its true acceleration."""
     protocol = read_recording_protocol(plan.protocols.band).protocol
     settings = DeviceSettings(
@@ -67,7 +69,7 @@ def play_row(plan: ReproductionPlan, playing: Playing) -> PlayedResponse:
         return _play_axes(plan, playing, device, peak_n)
 
 
-def _play_axes(plan: ReproductionPlan, playing: Playing, device: Device, peak_n: float) -> PlayedResponse:
+def _play_axes(plan: ReproductionPlan, playing: PlaybackRow, device: Device, peak_n: float) -> PlayedResponse:
     rate_hz = device.info.sample_rate_hz
     wave = wanted_wave(playing.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
     wanted, delivered, clipped = [], [], 0

@@ -42,7 +42,7 @@ def record_or_load(
     """Load the cached recording, or make it. Raises StudyError where the folder holds a recording of another run."""
     path = plan.recordings / f"{wanted.name}.h5"
     protocol = read_recording_protocol(wanted.protocol).protocol
-    found = _kept(path, plan, wanted, protocol)
+    found = _load_cached_recording(path, plan, wanted, protocol)
     if found is None:
         recording = RecordingPlan(protocol, wanted.device, wanted.place_m, plan.seed, path)
         total_s = recording.total_s
@@ -52,7 +52,7 @@ def record_or_load(
     return CachedRecording(path, found, _reduced_amplitude_warnings(found))
 
 
-def _kept(
+def _load_cached_recording(
     path: Path, plan: ReproductionPlan, wanted: RecordingRequest, protocol: RecordingProtocol
 ) -> Recording | None:
     """The cached recording; None where there is none or only an unfinished one, which is removed."""

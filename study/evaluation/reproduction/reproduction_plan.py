@@ -69,9 +69,9 @@ class Steps:
 
     def of(self, step: str) -> Callable[[float], None]:
         """Progress callback for one step: takes its own share, 0 to 1."""
-        return lambda share: self._tell(step, share)
+        return lambda share: self._report_share(step, share)
 
-    def _tell(self, step: str, share: float) -> None:
+    def _report_share(self, step: str, share: float) -> None:
         # Where a piece is played again its progress steps back; the whole does not.
         self._done[step] = max(self._done.get(step, 0.0), min(share, 1.0))
         done = sum(weight * self._done.get(name, 0.0) for name, weight in self._weights.items())

@@ -23,6 +23,7 @@ _MOST_OBJECTS, _MOST_VALUES = 2**21, 2**24
 _OURS = "hapteq"
 _OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
 _LOOKED_AT = 4096
+"""Bytes at the start of a file in which a format of ours names itself."""
 _UNIT_KEYS = ("unit", "units")
 _VALUE_KEYS = ("values", "value", "data", "samples")
 

@@ -16,11 +16,17 @@ from study.store.disk.declared_size import SizeLimit
 
 Array = npt.NDArray[Any]
 MOST_MAT_BYTES = 2**32
+"""Largest file that is read (4 GiB)."""
 DEEPEST = 32
+"""Deepest nesting of structures."""
 _HEADER_BYTES = 128
+"""Length of a MAT-file's header."""
 _COMPRESSED, _MATRIX = 15, 14
+"""Data types of the MAT-file format: miCOMPRESSED and miMATRIX."""
 _CELL, _STRUCT, _OBJECT, _TEXT, _FIRST_NUMBER, _LAST_NUMBER, _OPAQUE = 1, 2, 3, 4, 6, 15, 17
+"""Array classes of the MAT-file format (mxCELL_CLASS and so on)."""
 _COMPLEX = 0x0800
+"""Flag of an array with an imaginary part."""
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _CLASSES = {
     6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",

@@ -19,6 +19,7 @@ COMMENTS = ("#", "%")
 _ERRORS = (NOT_AVAILABLE, "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
 """Cells of a spreadsheet that look like the beginning of a comment but are not."""
 _LONGEST_ERROR = 8
+"""Characters of a spreadsheet's longest error value, such as `#DIV/0!`."""
 _LIKE_A_NUMBER = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
 _BRACKETED = re.compile(r"[\[(].*[\])]")
 

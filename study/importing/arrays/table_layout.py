@@ -189,11 +189,11 @@ def _are_units(fields: Sequence[str]) -> bool:
     """Whether each field is a known unit, in brackets or not, or empty; or all texts are in brackets."""
     stated = [field for field in fields if field.lower() not in _UNITLESS]
     return bool(stated) and (
-        all(is_unit(_bare(field)) for field in stated) or all(_bare(field) != field for field in stated)
+        all(is_unit(_strip_quotes(field)) for field in stated) or all(_strip_quotes(field) != field for field in stated)
     )
 
 
-def _bare(field: str) -> str:
+def _strip_quotes(field: str) -> str:
     match = re.fullmatch(r"[\[(]\s*(.*?)\s*[\])]", field)
     return match[1] if match else field
 
@@ -208,7 +208,7 @@ def with_units(header: Sequence[str], units: Sequence[str] | None) -> list[str]:
         return list(header)
     found = []
     for name, field in zip(header, units, strict=True):
-        stated, parsed = _bare(field), name_signal(name)
+        stated, parsed = _strip_quotes(field), name_signal(name)
         unit = plain_unit(stated)
         if unit.lower() in _UNITLESS:
             found.append(name)

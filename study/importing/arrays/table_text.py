@@ -18,9 +18,11 @@ from study.store.disk.file_errors import CannotReadError
 _LOOKED_AT = 4096
 """Bytes searched for UTF-16 without a byte order mark: every other byte of a table is then zero."""
 _READ_FOR_WORDS = 65536
+"""Bytes from which an encoding is detected."""
 _ENCODINGS = ("gb18030", "shift_jis", "euc_jp", "euc_kr", "big5", "cp1251", "koi8_r", "cp1250", "cp1253")
 _BEYOND_ASCII = re.compile(r"[^\x00-\x7f]+")
 _SHOWN = 24
+"""Characters beyond ASCII that a message shows."""
 
 
 @dataclass(frozen=True, slots=True)

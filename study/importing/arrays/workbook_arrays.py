@@ -47,7 +47,7 @@ class _Percent(float):
 
 def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
     """Arrays of a workbook. Raises OSError; ValueError with the sheet and the problem."""
-    book = _open(read_regular(path))
+    book = _open_workbook(read_regular(path))
     try:
         hidden = [sheet.title for sheet in book.worksheets if sheet.sheet_state != "visible" and not settings.sheet]
         read = [sheet for sheet in book.worksheets if sheet.title not in hidden]
@@ -72,7 +72,7 @@ def read_workbook_arrays(path: Path, settings: CsvMap) -> Table:
     )
 
 
-def _open(data: bytes) -> "Workbook":
+def _open_workbook(data: bytes) -> "Workbook":
     # Imported where workbooks are read: it takes longer than reading any other file.
     from openpyxl import load_workbook
 

@@ -97,13 +97,13 @@ class _Evaluation:
                 case ast.UnaryOp(op=ast.UAdd(), operand=inner):
                     return self._numbers(inner)
                 case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATIONS:
-                    return self._together(_OPERATIONS[type(operator)], left, right)
+                    return self._combine(_OPERATIONS[type(operator)], left, right)
                 case ast.Compare(left=left, ops=[order], comparators=[right]) if type(order) in _COMPARISONS:
-                    return self._together(_COMPARISONS[type(order)], left, right)
+                    return self._combine(_COMPARISONS[type(order)], left, right)
                 case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                     return self._call(name, arguments)
                 case ast.Subscript(value=inner, slice=index):
-                    return self._part(inner, index)
+                    return self._index_array(inner, index)
             raise self._refusal(node)
 
     def _leaf(self, node: ast.Constant | ast.Name) -> Any:
@@ -131,12 +131,12 @@ class _Evaluation:
         self.budget.spend(np.size(value), self.text)
         return np.negative(value)
 
-    def _together(self, operation: Callable[[Any, Any], Any], left: ast.expr, right: ast.expr) -> Value:
+    def _combine(self, operation: Callable[[Any, Any], Any], left: ast.expr, right: ast.expr) -> Value:
         first = self._numbers(left)
         with self.budget.hold_numbers(np.size(first)):
             second = self._numbers(right)
         try:
-            self._spend_on((first, second), 1)
+            self._count_cost((first, second), 1)
             return np.asarray(operation(first, second), dtype=np.float64)
         except ImportProblemError:
             raise
@@ -145,7 +145,7 @@ class _Evaluation:
                 f"in '{self.text}' arrays of the shapes {np.shape(first)} and {np.shape(second)} do not go together"
             ) from error
 
-    def _spend_on(self, values: Sequence[Value], times: int) -> None:
+    def _count_cost(self, values: Sequence[Value], times: int) -> None:
         """Count the cost of an elementwise operation on these values. Raises ValueError if their shapes do not fit."""
         size = math.prod(np.broadcast_shapes(*(np.shape(value) for value in values)))
         with self.budget.hold_numbers(sum(np.size(value) for value in values)):
@@ -169,7 +169,7 @@ class _Evaluation:
             if name == "repeat":
                 self.budget.spend(np.size(values[0]) * float(values[1]), self.text)
             else:
-                self._spend_on(values, _CALL_COSTS)
+                self._count_cost(values, _CALL_COSTS)
             return np.asarray(function.call(self.clock, *values), dtype=np.float64)
         except ImportProblemError:
             raise
@@ -182,7 +182,7 @@ class _Evaluation:
                 return self.lookup(name)
         raise ImportProblemError(f"in '{self.text}' array(\"NAME\") takes one name in quotes")
 
-    def _part(self, inner: ast.expr, index: ast.expr) -> Value:
+    def _index_array(self, inner: ast.expr, index: ast.expr) -> Value:
         whole = self._numbers(inner)
         entries = index.elts if isinstance(index, ast.Tuple) else [index]
         places: list[int | slice] = []
@@ -197,13 +197,13 @@ class _Evaluation:
 
     def _index(self, node: ast.expr) -> int | slice:
         if not isinstance(node, ast.Slice):
-            return self._whole(node)
-        bounds = [None if bound is None else self._whole(bound) for bound in (node.lower, node.upper, node.step)]
+            return self._whole_number(node)
+        bounds = [None if bound is None else self._whole_number(bound) for bound in (node.lower, node.upper, node.step)]
         if bounds[2] == 0:
             raise ImportProblemError(f"in '{self.text}' a step of 0 leads nowhere")
         return slice(*bounds)
 
-    def _whole(self, node: ast.expr) -> int:
+    def _whole_number(self, node: ast.expr) -> int:
         number = self._numbers(node)
         if np.ndim(number) or not float(number).is_integer():
             raise ImportProblemError(f"in '{self.text}' an index is not a whole number")

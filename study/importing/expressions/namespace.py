@@ -17,6 +17,7 @@ from study.importing.map_format.map_errors import ImportProblemError, suggestion
 from study.importing.map_format.signal_words import unit_in
 
 _SHOWN = 24
+"""Arrays that a message names."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,11 @@ from itertools import islice
 from study.errors import StudyError, WrongUseError
 
 _LONGEST_WORD = 60
+"""Characters of a name that are compared and shown."""
 _LONGEST_SENTENCE = 2000
+"""Characters of a message."""
 _MOST_NAMES = 500
+"""Known names with which an unknown one is compared."""
 _QUOTED = re.compile(rf"(?<!\w)'([^']{{{_LONGEST_WORD}}})[^']+'(?!\w)")
 
 NOTHING_WRITTEN = "Nothing was written."

@@ -15,8 +15,8 @@ from study.importing.map_format.map_errors import ImportProblemError
 def segments_of(
     wanted: tuple[SegmentMap, ...], part: tuple[str, str], command: FloatArray, rate_hz: float
 ) -> Iterator[Segment]:
-    """part: name of its file, and its prefix. command: (n, m) in the map's unit, which amplitudes also have. Raises
-    ImportProblemError."""
+    """The map's segments that fit this part, on its sample grid. part: name of its file, and its prefix. command: (n,
+    m) in the map's unit, which amplitudes also have. Raises ImportProblemError."""
     file, prefix = part
     for number, entry in enumerate(wanted, start=1):
         if fnmatchcase(file, entry.file) and (entry.prefix == "*" or fnmatchcase(prefix, entry.prefix)):

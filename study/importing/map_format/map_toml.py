@@ -8,8 +8,8 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from protocols.document.refusals import key_path, nearest_key, shown
 from protocols.document.schema import Node, Place, describe_allowed, keys_of, node_at, resolve_reference
+from protocols.document.validation_messages import key_path, nearest_key, shown
 from study.importing.map_format.import_map import ImportMap
 from study.store.disk.file_errors import UnusableFileError
 
@@ -21,7 +21,7 @@ MAP_SCHEMA: Node = _ADAPTER.json_schema()
 
 
 def parse_map(text: str, source: Path) -> ImportMap:
-    """source: for messages. Raises UnusableFileError with one problem for each key."""
+    """Parse the text of a map. source: for messages. Raises UnusableFileError with one problem for each key."""
     try:
         values = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
@@ -96,7 +96,7 @@ def _contradictions(found: ImportMap) -> Iterator[str]:
         if channel.clock and channel.clock not in clocks:
             yield f"channel '{channel.name}' is on the clock '{channel.clock}', but there are {', '.join(clocks)}"
     yield from _roles(found)
-    yield from _holds(found)
+    yield from _check_hold(found)
     yield from _clock_contradictions(found)
     if found.part and any(clock.file for clock in found.clock):
         yield "clocks with `file` put files side by side, [[part]] one after another; a map does one or the other"
@@ -136,7 +136,7 @@ def _roles(found: ImportMap) -> Iterator[str]:
 _RESAMPLED = {"zero-order": "held", "linear": "linear", "band-limited": "band-limited"}
 
 
-def _holds(found: ImportMap) -> Iterator[str]:
+def _check_hold(found: ImportMap) -> Iterator[str]:
     """The interpolation of a command between samples is stated in two places, which must agree."""
     for channel in found.channel:
         says = {"held": "zero-order"}.get(channel.resample, channel.resample)

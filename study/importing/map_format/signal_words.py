@@ -237,7 +237,7 @@ def unit_at_end(name: str) -> tuple[str, str]:
     if len(name) > LONGEST_NAME:
         return name, ""
     parts = name.split("_")
-    ends = [("_".join(parts[:first]), _joined(parts[first:])) for first in range(1, len(parts))]
+    ends = [("_".join(parts[:first]), _join_unit(parts[first:])) for first in range(1, len(parts))]
     ends += [(name[: mark.start()], name[mark.end() :]) for mark in _SAID_BEHIND.finditer(name)]
     for before, text in ends:
         unit = plain_unit(text)
@@ -249,7 +249,7 @@ def unit_at_end(name: str) -> tuple[str, str]:
     return name, ""
 
 
-def _joined(parts: Sequence[str]) -> str:
+def _join_unit(parts: Sequence[str]) -> str:
     """A unit whose signs are written as underscores."""
     text = "_".join(parts)
     text = re.sub(r"mps2$", "m/s^2", text)

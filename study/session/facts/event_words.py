@@ -69,7 +69,7 @@ def _describe(event: Event, presented: dict[_Key, TrialPresented]) -> str:
         case TrialMeasured():
             return _describe_measured(event)
         case TrialSpoiled():
-            return f"{_place(event)} is void and comes again: {event.reason}."
+            return f"{_place_text(event)} is void and comes again: {event.reason}."
         case RestTaken():
             return f"Rested {_seconds(event.rested_s)} before trial {event.trial + 1} of run {event.run + 1}."
         case _:
@@ -85,7 +85,7 @@ def _describe_other(event: Event) -> str:
         case PlaceTaken():
             return f"Takes part, as number {event.participant_number + 1} of this protocol."
         case DeviceChecked():
-            found = " ".join(_whole(finding) for finding in event.findings)
+            found = " ".join(_as_sentence(finding) for finding in event.findings)
             return f"The device was checked: {'fine' if event.passed else 'not fine'}. {found}".rstrip()
         case DemoPlayed():
             return (
@@ -111,7 +111,7 @@ def _describe_beside(event: OnsetPulsed | MaskingPlayed | ProbePlayed | ProbeMea
         sent = "was sent" if event.pulsed_s is not None else f"was lost: {_one_line(event.trouble)}"
         return f"Onset pulse, {_one_line(event.line)}: {sent}."
     if event.trouble:
-        return f"The masking noise fell silent: {_whole(event.trouble)}"
+        return f"The masking noise fell silent: {_as_sentence(event.trouble)}"
     if not event.playing:
         return "The masking noise was stopped."
     band = f"{event.low_hz:g} to {event.high_hz:g} Hz"
@@ -155,7 +155,7 @@ def _describe_presented(event: TrialPresented, with_direction: bool) -> str:
     if with_direction:
         shown = f"interval {event.direction}" if event.phase is Phase.DETECTION else f"direction {event.direction}"
         what = f"{shown}, {what}"
-    return f"{_place(event)} ({event.phase.value}{again}): {what}."
+    return f"{_place_text(event)} ({event.phase.value}{again}): {what}."
 
 
 def _describe_answer(event: AnswerGiven, presented: TrialPresented | None) -> str:
@@ -167,14 +167,14 @@ def _describe_answer(event: AnswerGiven, presented: TrialPresented | None) -> st
 
 def _describe_measured(event: TrialMeasured) -> str:
     if event.status == "unmeasured":
-        return " ".join(("Counts, without a measurement.", *map(_whole, event.flags)))
+        return " ".join(("Counts, without a measurement.", *map(_as_sentence, event.flags)))
     parts = []
     if event.delivered_mps2 is not None:
         parts.append(f"{event.delivered_mps2:.2f} m/s² along the direction")
     if event.off_axis_mps2 is not None:
         parts.append(f"{event.off_axis_mps2:.2f} m/s² across")
     measured = f"Delivered {', '.join(parts)}." if parts else "Counts."
-    return " ".join((measured, *map(_whole, event.flags)))
+    return " ".join((measured, *map(_as_sentence, event.flags)))
 
 
 def _describe_form(event: FormFilled) -> str:
@@ -200,7 +200,7 @@ def _device(device: DeviceFacts) -> str:
     return f"{device.name}{' (simulated, nothing moves)' if device.simulated else ''}"
 
 
-def _place(event: TrialPresented | TrialSpoiled) -> str:
+def _place_text(event: TrialPresented | TrialSpoiled) -> str:
     return f"Run {event.run + 1}, trial {event.trial + 1}"
 
 
@@ -222,7 +222,7 @@ def _one_line(text: str) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
-def _whole(text: str) -> str:
+def _as_sentence(text: str) -> str:
     """A flag or finding as a sentence of its own."""
     line = _one_line(text)
     return f"{line[:1].upper()}{line[1:]}{'' if line.endswith(('.', '!', '?')) else '.'}" if line else ""

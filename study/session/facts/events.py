@@ -97,6 +97,8 @@ FIELDS_SINCE: dict[str, object] = {
 
 @dataclass(frozen=True, config=FACT)
 class DeviceFacts:
+    """The device of a session: its name, whether it is simulated, and the rate of its loop."""
+
     name: str
     simulated: bool
     sample_rate_hz: Positive
@@ -218,6 +220,8 @@ class SessionInterrupted:
 
 @dataclass(frozen=True, config=FACT)
 class SessionResumed:
+    """A session goes on after a crash or a pause, perhaps with another device or version."""
+
     utc: UtcTime
     device: DeviceFacts
     versions: dict[str, str]

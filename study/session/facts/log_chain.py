@@ -39,14 +39,14 @@ class ChainBrokenError(ValueError):
 
 def write_chained(chain: Chain, event: bytes) -> tuple[Chain, bytes]:
     """Append an event (a JSON object without a line end). Returns the line with its checksum, line end included."""
-    after = _after(chain, event, carried=True)
+    after = _extend_chain(chain, event, carried=True)
     return after, event[:-1] + _FIELD + after.head.encode() + _END + b"\n"
 
 
 def read_chained(chain: Chain, line: bytes) -> tuple[Chain, bytes]:
     """Check a line without its end. Returns the chain and the event's own bytes. Raises ChainBrokenError."""
     event, head = _split(line)
-    after = _after(chain, event, carried=head is not None)
+    after = _extend_chain(chain, event, carried=head is not None)
     if head is None and chain.since:
         raise ChainBrokenError("has no checksum, although lines before it have")
     if head is not None and head != after.head:
@@ -54,7 +54,7 @@ def read_chained(chain: Chain, line: bytes) -> tuple[Chain, bytes]:
     return after, event
 
 
-def _after(chain: Chain, event: bytes, carried: bool) -> Chain:
+def _extend_chain(chain: Chain, event: bytes, carried: bool) -> Chain:
     lines = chain.lines + 1
     head = hashlib.sha256(chain.head.encode() + b"\n" + event).hexdigest()[:DIGITS]
     return Chain(head, lines, chain.since or (lines if carried else 0))

@@ -1,4 +1,4 @@
-"""What came from an accelerometer with a clock of its own while a stimulus was played: counted, and logged."""
+"""Counts of the samples received and lost from an accelerometer with its own clock, while a stimulus was played."""
 
 from pydantic.dataclasses import dataclass
 

@@ -66,6 +66,8 @@ class PlaceTaken:
 
 @dataclass(frozen=True, config=FACT)
 class DeviceChecked:
+    """Result of the device check before a sitting."""
+
     utc: UtcTime
     passed: bool
     findings: tuple[str, ...]
@@ -159,6 +161,8 @@ class MaskingPlayed:
 
 @dataclass(frozen=True, config=FACT)
 class DemoFinished:
+    """The participant ended the labelled demonstration."""
+
     utc: UtcTime
     monotonic_s: Seconds | None = None
     event: Literal["demo_finished"] = "demo_finished"
@@ -166,6 +170,8 @@ class DemoFinished:
 
 @dataclass(frozen=True, config=FACT)
 class RestTaken:
+    """An enforced rest is over."""
+
     utc: UtcTime
     run: Index
     trial: Index
@@ -177,6 +183,8 @@ class RestTaken:
 
 @dataclass(frozen=True, config=FACT)
 class PauseTaken:
+    """A pause is over."""
+
     utc: UtcTime
     who: Literal["participant", "experimenter", "program"]
     paused_s: Seconds
@@ -186,6 +194,8 @@ class PauseTaken:
 
 @dataclass(frozen=True, config=FACT)
 class NoteTaken:
+    """A note for the log, or a report of an adverse event."""
+
     utc: UtcTime
     who: Literal["participant", "experimenter", "program"]
     text: str

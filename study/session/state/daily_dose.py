@@ -1,4 +1,8 @@
-"""Vibration dose of the same hand in other sessions of the day: the daily dose does not restart with each session."""
+"""Vibration dose of the same hand in other sessions of the day.
+
+The daily exposure A(8) of hand-transmitted vibration (ISO 5349-1, `vibration_dose`) adds up over all sessions since
+the last night's rest; it does not restart with each session.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,10 +23,11 @@ def dose_elsewhere(
     known; a clock set back counts as no time.
     """
     until_now = {name: pass_time(sitting, Moment(utc), resumed=True) for name, sitting in sessions.items()}
-    moved = {name: sitting for name, sitting in until_now.items() if sitting.still_s is not None}
+    exposed = {name: sitting for name, sitting in until_now.items() if sitting.still_s is not None}
     today: dict[str, SittingState] = {}
+    # Times before now (s): `still_s` since the last vibration, `began_s` since the earliest session counted so far.
     began_s = 0.0
-    for name, sitting in sorted(moved.items(), key=lambda known: known[1].still_s or 0.0):
+    for name, sitting in sorted(exposed.items(), key=lambda known: known[1].still_s or 0.0):
         still_s = sitting.still_s or 0.0
         if still_s - began_s >= NIGHT_S:
             break

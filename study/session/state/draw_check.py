@@ -28,14 +28,16 @@ def check_draw(event: TrialPresented, expected: Present) -> None:
         "wanted_mps2": (event.wanted_mps2, expected.wanted_mps2),
         "nominal_n": (event.nominal_n, expected.nominal_n),
     }
-    wrong = [f"{name} {logged} where {due} is due" for name, (logged, due) in given.items() if not _same(logged, due)]
+    wrong = [
+        f"{name} {logged} where {due} is due" for name, (logged, due) in given.items() if not _is_same(logged, due)
+    ]
     if wrong:
         raise LogContradiction(
             f"{place_of(event)} was presented with {', '.join(wrong)}: this session was begun with different rules"
         )
 
 
-def _same(logged: str | float | None, due: str | float | None) -> bool:
+def _is_same(logged: str | float | None, due: str | float | None) -> bool:
     """Equal up to the last bits of floating-point powers, which may differ between machines."""
     if isinstance(logged, float) and isinstance(due, float):
         return math.isclose(logged, due, rel_tol=1e-9, abs_tol=1e-9)

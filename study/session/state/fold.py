@@ -72,7 +72,7 @@ def _advance_time(sitting: SittingState, event: Event) -> SittingState:
 def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
     match event:
         case RestTaken():
-            return _rest(state, event)
+            return _apply_rest(state, event)
         case PauseTaken():
             return _with_probing(state, after_break(state.sitting.probing, event, state.protocol.probes))
         case ProbePlayed() | ProbeMeasured():
@@ -92,7 +92,7 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
             return state
 
 
-def _rest(state: SessionState, event: RestTaken) -> SessionState:
+def _apply_rest(state: SessionState, event: RestTaken) -> SessionState:
     if state.rest_due_s <= 0:
         raise LogContradiction(f"a rest before trial {event.trial} of run {event.run}, where none was due")
     rested = _with_probing(state, after_break(state.sitting.probing, event, state.protocol.probes))

@@ -11,6 +11,7 @@ from study.session.views.views import Progress
 USUAL_TRIALS = 65
 """Trials of a staircase with 13 reversals; 60 with few errors, 110 for guessing."""
 USUAL_PER_REVERSAL = USUAL_TRIALS / 13
+"""Trials per reversal."""
 
 
 LATEST = 30

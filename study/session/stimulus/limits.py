@@ -14,6 +14,7 @@ SPRING_SLEW_N_PER_S = 100.0
 """Allowance for the centring spring: 150 N/m at 0.6 m/s, faster than a hand moves in a trial."""
 
 SLEW_MARGIN = 1.05
+"""Factor on the steepest slope of the stimuli, for rounding and fades."""
 
 BETWEEN_SAMPLES = math.sqrt(2)
 """Bound of a multisine between its samples: with lines below a quarter of the rate the continuous signal exceeds the

@@ -70,11 +70,11 @@ def press(entry: FormEntry, key: str, character: str | None = None, stacked: boo
     if field is not None and field.choices and stacked and key in ("up", "down"):
         marked = move_mark(entry.given[entry.at].marked, STEPS[key], len(field.choices), stay=False)
         if marked is not None:
-            return _with(entry, marked=marked)
+            return _change_field(entry, marked=marked)
     if key in STEPS:
         return go_to(entry, entry.at + STEPS[key])
     if field is None:
-        return _send(entry) if key == "enter" else None
+        return _send_form(entry) if key == "enter" else None
     return _press_choice(entry, field, key, character) if field.choices else _press_text(entry, key, character)
 
 
@@ -90,7 +90,7 @@ def click_choice(entry: FormEntry, at: int, choice: int) -> FormEntry:
 
 def click_continue(entry: FormEntry) -> FormEntry:
     """The entry after a click on Continue."""
-    return entry if entry.sent else _send(go_to(entry, len(entry.form.fields)))
+    return entry if entry.sent else _send_form(go_to(entry, len(entry.form.fields)))
 
 
 def paste(entry: FormEntry, text: str) -> FormEntry:
@@ -124,13 +124,13 @@ def find_choice(choices: tuple[str, ...], character: str) -> int | None:
 def _press_choice(entry: FormEntry, field: FormField, key: str, character: str | None) -> FormEntry | None:
     given = entry.given[entry.at]
     if key in ("left", "right"):
-        return _with(entry, marked=move_mark(given.marked, 1 if key == "right" else -1, len(field.choices)))
+        return _change_field(entry, marked=move_mark(given.marked, 1 if key == "right" else -1, len(field.choices)))
     if key in ("space", "enter"):
         chosen = entry if given.marked is None else _choose(entry, given.marked)
         leaves = chosen.given[entry.at].answer or not field.needed
         return go_to(chosen, entry.at + 1) if key == "enter" and leaves else chosen
     if key in ("backspace", "delete") and not field.needed:
-        return _with(entry, answer="")
+        return _change_field(entry, answer="")
     named = find_choice(field.choices, character) if character else None
     return None if named is None else _choose(entry, named)
 
@@ -141,32 +141,32 @@ def _press_text(entry: FormEntry, key: str, character: str | None) -> FormEntry 
         case "enter":
             return go_to(entry, entry.at + 1)
         case "left" | "right":
-            return _with(entry, caret=min(max(caret + (1 if key == "right" else -1), 0), len(text)))
+            return _change_field(entry, caret=min(max(caret + (1 if key == "right" else -1), 0), len(text)))
         case "home" | "end":
-            return _with(entry, caret=0 if key == "home" else len(text))
+            return _change_field(entry, caret=0 if key == "home" else len(text))
         case "backspace":
-            return _with(entry, answer=text[: max(caret - 1, 0)] + text[caret:], caret=max(caret - 1, 0))
+            return _change_field(entry, answer=text[: max(caret - 1, 0)] + text[caret:], caret=max(caret - 1, 0))
         case "delete":
-            return _with(entry, answer=text[:caret] + text[caret + 1 :])
+            return _change_field(entry, answer=text[:caret] + text[caret + 1 :])
     return _write(entry, character) if character and character.isprintable() else None
 
 
 def _write(entry: FormEntry, characters: str) -> FormEntry:
     text, caret = entry.given[entry.at].answer, entry.given[entry.at].caret
     fitting = characters[: MOST_CHARACTERS - len(text)]
-    return _with(entry, answer=text[:caret] + fitting + text[caret:], caret=caret + len(fitting))
+    return _change_field(entry, answer=text[:caret] + fitting + text[caret:], caret=caret + len(fitting))
 
 
 def _choose(entry: FormEntry, choice: int) -> FormEntry:
     field, before = entry.form.fields[entry.at], entry.given[entry.at].answer
     answer = field.choices[choice]
-    chosen = _with(entry, answer=answer, marked=choice)
+    chosen = _change_field(entry, answer=answer, marked=choice)
     if before in ("", answer) or entry.form.kind not in CHECKED:
         return chosen
     return replace(chosen, replaced=entry.replaced | {entry.at})
 
 
-def _with(
+def _change_field(
     entry: FormEntry, answer: str | None = None, marked: int | None = None, caret: int | None = None
 ) -> FormEntry:
     """The entry with changes to the field under the cursor; None leaves a value."""
@@ -181,7 +181,7 @@ def _with(
     return replace(entry, given=given, open=() if answered else entry.open, check=() if answered else entry.check)
 
 
-def _send(entry: FormEntry) -> FormEntry:
+def _send_form(entry: FormEntry) -> FormEntry:
     """Send the form; refused, with the cursor on the first problem, while answers are missing or changed choices
     unchecked."""
     gaps = find_missing_fields(entry.form, reply_of(entry))

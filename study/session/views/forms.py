@@ -10,7 +10,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.form_views import Form, FormField, FormKind, FormReply, Limits, coded
 
 YES_NO = ("yes", "no")
-"""As they are kept; what is shown depends on the language."""
+"""Answers as they are logged; the shown text depends on the language."""
 HEARING = {
     "ear plugs": "hearing_plugs",
     "ear muffs": "hearing_muffs",
@@ -20,7 +20,7 @@ HEARING = {
 }
 GRIPS = {"pen grip": "grip_pen", "whole hand": "grip_hand", "finger tips": "grip_tips", "other": "grip_other"}
 HANDS = {"right": "hand_right", "left": "hand_left"}
-"""What is kept, and the key of its text."""
+"""Answers as they are logged, and the keys of their texts."""
 
 
 @dataclass(frozen=True, slots=True)

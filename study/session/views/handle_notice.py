@@ -6,7 +6,7 @@ from protocols.definition.recording_protocol import RecordingProtocol
 from study.errors import StudyError
 
 BeforeMoving = Callable[[str], None]
-"""Told a notice for the people around a real device; an exception from it keeps the device still."""
+"""Shows a notice to the people around a real device; an exception from it keeps the device still."""
 
 
 def refuse_unannounced(notice: str) -> None:
@@ -40,7 +40,7 @@ def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
     )
 
 
-def proof_notice(device: str, force_n: float) -> str:
+def limit_test_notice(device: str, force_n: float) -> str:
     """Notice before the proof that a device's cap holds and that it lets go: without a spring, so the handle moves
     freely."""
     return (

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from typing import Literal
 
 Zone = Callable[[datetime], datetime]
-"""From a moment with any offset to the same moment by the clock of a place, summer time included."""
+"""Converts a moment with any UTC offset to the clock of a place, summer time included."""
 
 Detail = Literal["minutes", "seconds"]
 

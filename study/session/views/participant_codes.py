@@ -1,4 +1,4 @@
-"""What a participant code looks like: a rule for screens, command line and store alike. Pure, and light to import."""
+"""Form of a participant code: one rule for screens, command line and store. Pure, and light to import."""
 
 import re
 

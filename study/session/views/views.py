@@ -1,4 +1,4 @@
-"""What a participant's display may know. Nothing here gives away level, frequency or correctness.
+"""Values for the participant's display. None of them reveals level, frequency or correctness.
 
 Values only, and light to import: a screen shows its first frame before anything heavy is loaded.
 """

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.facts.log_time import Moment, elapsed_s, seconds_between
 from study.session.facts.void_reasons import computer_too_busy
+from study.session.watching.followed_session import FollowedSession
 from study.session.watching.live import Live
 from study.session.watching.watch_view import ON, Alarm, DriftLine, Exposure, Standing
-from study.session.watching.watched import Watched
 
 SILENT_AFTER_S = 3.0
 """`live.json` is written about four times a second; a slow disk may delay it by a second or two."""
@@ -18,7 +18,7 @@ HANDLE_AWAY_S = 2.0
 UNANSWERED_S = 60.0
 """Answers take seconds; after this time the participant may need help."""
 JUST_NOW_S = 60.0
-"""How long the end of a sitting is reported."""
+"""Time for which the end of a sitting is reported (s)."""
 CATCH_TRIALS, LAPSES = 5, 2
 """This many wrong ones among the last five catch trials: an attentive participant misses none at full level."""
 PRESENTATIONS, VOIDS = 10, 3
@@ -31,7 +31,7 @@ NEAR = 0.8
 class Situation:
     """Everything that alarms depend on, at one moment."""
 
-    watched: Watched
+    watched: FollowedSession
     live: Live | None
     problem: str
     """Why the log cannot be followed; empty where it can."""

@@ -44,7 +44,7 @@ def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
         lines = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
     except csv.Error as error:
         raise CsvError((f"this is not CSV: {error}",)) from error
-    names = _present(tuple(lines[0]), row_type)
+    names = _present_columns(tuple(lines[0]), row_type)
     if problem := header_problem(tuple(lines[0]), names):
         raise CsvError((problem,))
     hints = get_type_hints(row_type)
@@ -71,12 +71,12 @@ def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
 def as_written_in(text: str, rows: Iterable[Row], row_type: type[Row]) -> tuple[Row, ...]:
     """Rows restricted to the columns of an earlier version's table: columns it lacks have their defaults."""
     header = next(csv.reader(io.StringIO(text.partition("\n")[0])), [])
-    absent = columns(row_type)[len(_present(tuple(header), row_type)) :]
+    absent = columns(row_type)[len(_present_columns(tuple(header), row_type)) :]
     defaults = {field.name: field.default for field in fields(row_type) if field.name in absent}
     return tuple(replace(row, **defaults) for row in rows)
 
 
-def _present(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
+def _present_columns(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
     """The columns to read: trailing ones with a default may be missing, as in tables of earlier versions."""
     names = columns(row_type)
     needed = sum(field.default is MISSING for field in fields(row_type))

@@ -23,7 +23,9 @@ DAMAGED = (
 """Exceptions of reading libraries for damaged or misnamed files."""
 
 _LONGEST_PROBLEM = 600
+"""Characters of a problem that are shown."""
 _MOST_PROBLEMS = 40
+"""Problems that are listed; the rest is counted."""
 
 
 class UnusableFileError(StudyError):

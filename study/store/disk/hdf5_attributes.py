@@ -7,7 +7,9 @@ import h5py
 import numpy as np
 
 _MOST_ENTRIES = 1000
+"""Largest attribute that is read, in entries."""
 _LONGEST_SHOWN = 100
+"""Characters of a value that a message shows."""
 
 
 class AttributeProblemError(ValueError):

@@ -18,7 +18,8 @@ _DEFLATE_FACTOR = 1032
 
 
 def check_contents(file: Any) -> None:
-    """Raises ValueError with a sentence fragment for external data and for oversized datasets."""
+    """Check that an open file refers to no other file and declares no oversized contents. Raises ValueError with a
+    sentence fragment for external data and for oversized datasets."""
     limit = SizeLimit(file.id.get_filesize())
     for name, dataset in datasets_in(file):
         _check_dataset(name, dataset, limit)

@@ -82,7 +82,8 @@ def open_hdf5(path: Path, kind: str, format_name: str, version: int, *, sealed: 
 
 
 def float_dataset(file: Any, name: str, shape: str) -> FloatArray:
-    """shape: in words, as in "(samples, channels)". Raises ValueError with a sentence fragment."""
+    """Read a dataset of numbers. shape: in words, as in "(samples, channels)". Raises ValueError with a sentence
+    fragment."""
     dataset = file.get(name)
     if not isinstance(dataset, h5py.Dataset):
         raise ValueError(f"the dataset '{name}' is missing")

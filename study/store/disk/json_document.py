@@ -42,9 +42,9 @@ def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
     document = parse_json(path, read_text(path, DOCUMENT_BYTES), format_name)
     found, number = document.pop("format", None), document.pop("version", None)
     if found != format_name:
-        raise UnusableFileError(path, format_name, (f"its format is {_said(found)}, not '{format_name}'",))
+        raise UnusableFileError(path, format_name, (f"its format is {_value_text(found)}, not '{format_name}'",))
     if number != version or isinstance(number, bool):
-        wrong = f"its version is {_said(number)}; this program reads version {version}"
+        wrong = f"its version is {_value_text(number)}; this program reads version {version}"
         raise UnusableFileError(path, format_name, (wrong,))
     return document
 
@@ -61,5 +61,5 @@ def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:
     return document
 
 
-def _said(value: Any) -> str:
+def _value_text(value: Any) -> str:
     return "missing" if value is None else repr(value)

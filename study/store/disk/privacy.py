@@ -97,19 +97,19 @@ def data_folder_warning(data: Path) -> str:
 def _close(place: RealFolder, inside: bool) -> None:
     if place.descriptor is None:
         return
-    _narrow(place.descriptor)
+    _restrict_access(place.descriptor)
     for name in place.names() if inside else ():
         with contextlib.suppress(OSError):
             descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=place.descriptor)
             try:
-                _narrow(descriptor)
+                _restrict_access(descriptor)
                 if stat.S_ISDIR(os.fstat(descriptor).st_mode):
                     _close(RealFolder(place.path / name, descriptor), inside)
             finally:
                 os.close(descriptor)
 
 
-def _narrow(descriptor: int) -> None:
+def _restrict_access(descriptor: int) -> None:
     found = os.fstat(descriptor)
     if found.st_mode & OTHERS and (stat.S_ISDIR(found.st_mode) or stat.S_ISREG(found.st_mode)):
         os.fchmod(descriptor, stat.S_IMODE(found.st_mode) & ~OTHERS)

@@ -11,12 +11,12 @@ from pathlib import Path
 
 def is_real_folder(path: Path) -> bool:
     """Whether it is a folder and not a link."""
-    return _kind(path) == stat.S_IFDIR
+    return _read_kind(path) == stat.S_IFDIR
 
 
 def is_real_file(path: Path) -> bool:
     """Whether it is a regular file: no link, pipe or device."""
-    return _kind(path) == stat.S_IFREG
+    return _read_kind(path) == stat.S_IFREG
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +33,10 @@ class RealFolder:
     def erase(self, name: str) -> None:
         """Erase a file, a link itself, or a folder with its contents; nothing if it is gone."""
         with suppress(FileNotFoundError):
-            if stat.S_ISDIR(os.stat(self._at(name), dir_fd=self.descriptor, follow_symlinks=False).st_mode):
-                shutil.rmtree(self._at(name), dir_fd=self.descriptor)
+            if stat.S_ISDIR(os.stat(self._path_text(name), dir_fd=self.descriptor, follow_symlinks=False).st_mode):
+                shutil.rmtree(self._path_text(name), dir_fd=self.descriptor)
             else:
-                os.unlink(self._at(name), dir_fd=self.descriptor)
+                os.unlink(self._path_text(name), dir_fd=self.descriptor)
 
     def erase_if_empty(self, name: str) -> None:
         """Erase a folder inside this one if it is empty."""
@@ -44,14 +44,14 @@ class RealFolder:
             with open_folder(self, name) as inner:
                 empty = not inner.names()
             if empty:
-                os.rmdir(self._at(name), dir_fd=self.descriptor)
+                os.rmdir(self._path_text(name), dir_fd=self.descriptor)
 
     def sync(self) -> None:
         """Sync the directory entries to the disk."""
         if self.descriptor is not None:
             os.fsync(self.descriptor)
 
-    def _at(self, name: str) -> str:
+    def _path_text(self, name: str) -> str:
         return name if self.descriptor is not None else str(self.path / name)
 
 
@@ -61,11 +61,11 @@ def open_folder(where: Path | RealFolder, *names: str) -> Iterator[RealFolder]:
 
     Raises NotADirectoryError where a level is a link or no folder, FileNotFoundError where it is missing.
     """
-    folder = _open(where, None) if isinstance(where, Path) else where
+    folder = _open_real(where, None) if isinstance(where, Path) else where
     opened = [] if folder is where else [folder]
     try:
         for name in names:
-            folder = _open(folder.path / name, folder.descriptor)
+            folder = _open_real(folder.path / name, folder.descriptor)
             opened.append(folder)
         yield folder
     finally:
@@ -74,7 +74,7 @@ def open_folder(where: Path | RealFolder, *names: str) -> Iterator[RealFolder]:
                 os.close(each.descriptor)
 
 
-def _open(path: Path, parent: int | None) -> RealFolder:
+def _open_real(path: Path, parent: int | None) -> RealFolder:
     if os.open not in os.supports_dir_fd:
         if not is_real_folder(path):
             raise NotADirectoryError(f"{path.name} is a link or no folder")
@@ -83,7 +83,7 @@ def _open(path: Path, parent: int | None) -> RealFolder:
     return RealFolder(path, os.open(path if parent is None else path.name, flags, dir_fd=parent))
 
 
-def _kind(path: Path) -> int:
+def _read_kind(path: Path) -> int:
     try:
         return stat.S_IFMT(path.lstat().st_mode)
     except (OSError, ValueError):  # no name that a file can have

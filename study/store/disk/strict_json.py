@@ -16,7 +16,7 @@ def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
             text,
             parse_constant=None if with_nan else _refuse,
             parse_float=_finite,
-            parse_int=_whole,
+            parse_int=_parse_whole,
             object_pairs_hook=_without_doubles,
         )
     except RecursionError:
@@ -61,7 +61,7 @@ def _finite(digits: str) -> float:
     return number
 
 
-def _whole(digits: str) -> int:
+def _parse_whole(digits: str) -> int:
     if len(digits) > _LONGEST_NUMBER + digits.startswith("-"):
         raise ValueError(f"a whole number in it has {len(digits)} digits; up to {_LONGEST_NUMBER} are read")
     return int(digits)

@@ -11,7 +11,7 @@ from study.store.disk.atomic_write import write_atomically
 
 
 def write_wav(path: Path, samples: NDArray[np.int16], sample_rate_hz: int) -> None:
-    """samples: (n,). Raises AlreadyThereError, CannotWriteError."""
+    """Write samples as a WAV file. samples: (n,). Raises AlreadyThereError, CannotWriteError."""
     content = io.BytesIO()
     with wave.open(content, "wb") as file:
         file.setnchannels(1)

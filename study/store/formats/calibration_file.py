@@ -47,7 +47,7 @@ DIMENSIONS = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3)"
 
 
 def read_calibration(path: Path) -> LinkageCalibration:
-    """Raises CannotReadError, or UnusableFileError with all problems."""
+    """Read a calibration of a linkage. Raises CannotReadError, or UnusableFileError with all problems."""
     problems = Problems()
     with open_hdf5(path, KIND, FORMAT, VERSION, sealed=True) as file:
         parts = _parts(file, problems)
@@ -60,7 +60,7 @@ def read_calibration(path: Path) -> LinkageCalibration:
 
 
 def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
-    """Raises AlreadyThereError, CannotWriteError."""
+    """Write a calibration of a linkage. Raises AlreadyThereError, CannotWriteError."""
 
     def fill(file: Any) -> None:
         file.attrs.update({"format": FORMAT, "version": VERSION, "difference": calibration.difference})

@@ -32,12 +32,12 @@ class DailyCheck:
 
 
 def write_daily_check(path: Path, check: DailyCheck) -> None:
-    """Raises AlreadyThereError, CannotWriteError."""
+    """Write the result of a daily check. Raises AlreadyThereError, CannotWriteError."""
     write_json(path, FORMAT, VERSION, asdict(check), gather_provenance())
 
 
 def read_daily_check(path: Path) -> DailyCheck:
-    """Raises CannotReadError, UnusableFileError."""
+    """Read the result of a daily check. Raises CannotReadError, UnusableFileError."""
     document = read_json(path, FORMAT, VERSION)
     try:
         found = {field.name: document[field.name] for field in fields(DailyCheck)}

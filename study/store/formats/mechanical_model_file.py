@@ -6,8 +6,7 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.layout import Entry
-from study.store.disk.text_file import write_text
-from study.store.disk.toml_text import read_toml_text
+from study.store.disk.text_file import read_toml_text, write_text
 
 KIND = "mechanical model"
 

@@ -13,7 +13,7 @@ from protocols.wording.english import ENGLISH, LANGUAGES
 from protocols.wording.in_language import in_language, known_languages, language_of, own_words, table_problems
 from study.errors import WrongUseError
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.toml_text import read_toml_text
+from study.store.disk.text_file import read_toml_text
 
 KIND = "table of texts"
 

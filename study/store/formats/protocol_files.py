@@ -18,8 +18,7 @@ from study.local_clock import machine_zone
 from study.regular_file import DOCUMENT_BYTES
 from study.session.views.local_time import local_time
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.text_file import read_text, write_text
-from study.store.disk.toml_text import read_toml_text
+from study.store.disk.text_file import read_text, read_toml_text, write_text
 from study.store.formats.participant_texts import load_in_language
 
 P = TypeVar("P", bound=Protocol, covariant=True)

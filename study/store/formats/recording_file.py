@@ -32,6 +32,7 @@ _SEGMENT_TYPE = np.dtype(
 )  # fmt: skip
 
 _PACK_ABOVE_BYTES = 2**18
+"""Arrays above this size are compressed; smaller ones are too small to gain by it."""
 
 
 def read_recording(path: Path) -> Recording:
@@ -48,7 +49,9 @@ def read_recording(path: Path) -> Recording:
             signal(name) if name in file else None for name in ("position", "excitation", "condition")
         )
         device = problems.attempt(lambda: text_attribute(file, "device"), "")
-        hold = problems.attempt(lambda: _hold(text_attribute(file, "hold", Hold.ZERO_ORDER.value)), Hold.ZERO_ORDER)
+        hold = problems.attempt(
+            lambda: _parse_hold(text_attribute(file, "hold", Hold.ZERO_ORDER.value)), Hold.ZERO_ORDER
+        )
         segments: tuple[Segment, ...] = problems.attempt(lambda: _segments(file), ())
         time_s = problems.attempt(lambda: _time_s(file), None)
         meta: dict[str, Any] = problems.attempt(lambda: _meta(file), {})
@@ -134,7 +137,7 @@ def _time_s(file: Any) -> FloatArray | None:
     return stamps
 
 
-def _hold(text: str) -> Hold:
+def _parse_hold(text: str) -> Hold:
     if text not in {hold.value for hold in Hold}:
         raise ValueError(f"hold is '{text}'; allowed are {', '.join(hold.value for hold in Hold)}")
     return Hold(text)

@@ -11,7 +11,7 @@ from study.store.disk.text_file import read_text, write_text
 
 THRESHOLDS_NAME = "thresholds.csv"
 DETECTION_NAME = "detection.csv"
-"""Written only for detection runs."""
+"""Table of detection thresholds; written only where there are detection runs."""
 THRESHOLDS_HEADER = columns(Threshold)
 KIND = "table of thresholds"
 

@@ -100,7 +100,7 @@ def read_log(path: Path) -> LogContents:
     *lines, tail = data.split(b"\n")
     chain, events = Chain(), []
     for line in lines:
-        chain, event = _next(path, chain, line)
+        chain, event = _parse_next(path, chain, line)
         events.append(event)
     whole = data[: len(data) - len(tail)]
     return LogContents(tuple(events), tail.decode("utf-8", errors="replace"), len(tail), chain, whole)
@@ -112,7 +112,7 @@ def read_opening(path: Path) -> Event | None:
         return None
     with open_regular(path) as file:
         line = file.readline(DOCUMENT_BYTES)
-    return _next(path, Chain(), line.removesuffix(b"\n"))[1] if line.endswith(b"\n") else None
+    return _parse_next(path, Chain(), line.removesuffix(b"\n"))[1] if line.endswith(b"\n") else None
 
 
 def readable_events(path: Path) -> tuple[Event, ...]:
@@ -172,7 +172,7 @@ def hold_log_lock(path: Path) -> Iterator[None]:
         log.close()
 
 
-def _next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
+def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
     """The event of the next line, given without its line end. Raises StudyError."""
     try:
         after, event = read_chained(chain, line)

@@ -19,6 +19,7 @@ LIVE_VERSION = 1
 
 _ACTIVITIES = get_args(Activity)
 _LARGEST_BYTES = 1 << 16
+"""Largest file that is read; ours have about a kilobyte."""
 
 
 def write_live(folder: Path, live: Live) -> None:

@@ -101,7 +101,7 @@ def check_seals(folder: Path, contents: LogContents) -> int:
                 f"Restore {LOG_NAME} from a copy.",
                 saved="Nothing was changed.",
             )
-        if not _holds(folder, seal, contents.whole[: seal.bytes]):
+        if not _is_sealed_prefix(folder, seal, contents.whole[: seal.bytes]):
             raise _contradiction(folder, contents, f"{path.name} says something else than {LOG_NAME}.")
         sealed = max(sealed, seal.lines)
     return sealed
@@ -122,7 +122,7 @@ def is_sealed(folder: Path, content: bytes) -> bool:
     return not tail and check_seals(folder, LogContents((), "", 0, chain, content)) > 0
 
 
-def _holds(folder: Path, seal: Seal, prefix: bytes) -> bool:
+def _is_sealed_prefix(folder: Path, seal: Seal, prefix: bytes) -> bool:
     return (
         seal.session == folder.name
         and seal.sha256 == hashlib.sha256(prefix).hexdigest()

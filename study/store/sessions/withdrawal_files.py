@@ -20,8 +20,8 @@ WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION = "hapteq-withdrawal", 1
 
 
 @dataclass(frozen=True, slots=True)
-class Begun:
-    """What a session folder says of its participant: nothing measured."""
+class SessionParticipant:
+    """The participant of a session, as its folder names them: nothing measured."""
 
     protocol: str
     simulated: bool
@@ -30,37 +30,39 @@ class Begun:
 
 
 @dataclass(frozen=True, slots=True)
-class Intent:
+class WithdrawalIntent:
     """What is about to be erased, determined before any erasing."""
 
     subject: str
     withdrawn_utc: str
-    sessions: Mapping[str, Begun | None]
+    sessions: Mapping[str, SessionParticipant | None]
     derived: tuple[str, ...]
     """Files and folders beside the sessions, relative to the data folder."""
 
 
-def write_intent(data: Path, intent: Intent) -> None:
+def write_intent(data: Path, intent: WithdrawalIntent) -> None:
     """Write the intent; on return it is on the disk."""
     path = withdrawal_file(data, intent.subject)
     write_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION, asdict(intent), overwrite=True)
 
 
-def read_intent(data: Path, subject: str) -> Intent | None:
+def read_intent(data: Path, subject: str) -> WithdrawalIntent | None:
     """The intent; None if there is no usable one: its content is then determined again. Never raises."""
     path = withdrawal_file(data, subject)
     if not is_real_file(path):
         return None
     try:
         left = read_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION)
-        sessions = {str(name): _parse_begun(begun) for name, begun in left["sessions"].items() if _of(name, subject)}
-        derived = tuple(str(name) for name in left["derived"] if _inside(str(name)))
-        return Intent(subject, str(left["withdrawn_utc"]), sessions, derived)
+        sessions = {
+            str(name): _parse_begun(begun) for name, begun in left["sessions"].items() if _is_of_subject(name, subject)
+        }
+        derived = tuple(str(name) for name in left["derived"] if _is_plain_name(str(name)))
+        return WithdrawalIntent(subject, str(left["withdrawn_utc"]), sessions, derived)
     except (StudyError, AttributeError, KeyError, TypeError):
         return None
 
 
-def write_tombstone(folder: SessionFolder, withdrawn_utc: str, begun: Begun | None) -> None:
+def write_tombstone(folder: SessionFolder, withdrawn_utc: str, begun: SessionParticipant | None) -> None:
     """Replace the session's contents. An existing tombstone is kept."""
     if not is_real_file(folder.tombstone):
         left = {"session": folder.name, "withdrawn_utc": withdrawn_utc, "begun": asdict(begun) if begun else None}
@@ -75,7 +77,7 @@ def read_tombstone(folder: SessionFolder) -> dict[str, Any]:
         return {}
 
 
-def read_begun(folder: SessionFolder) -> Begun | None:
+def read_begun(folder: SessionFolder) -> SessionParticipant | None:
     """The participant facts in a tombstone."""
     return _parse_begun(read_tombstone(folder).get("begun"))
 
@@ -99,19 +101,19 @@ def how_to_finish(folder: SessionFolder) -> str:
     return f"{still}Go on with: hapteq withdraw {folder.name} --data {folder.path.parent}"
 
 
-def _parse_begun(left: Any) -> Begun | None:
+def _parse_begun(left: Any) -> SessionParticipant | None:
     try:
-        return Begun(**left) if left else None
+        return SessionParticipant(**left) if left else None
     except TypeError:
         return None
 
 
-def _of(name: Any, subject: str) -> bool:
+def _is_of_subject(name: Any, subject: str) -> bool:
     match = FOLDER.fullmatch(str(name))
     return match is not None and match["subject"] == subject
 
 
-def _inside(name: str) -> bool:
+def _is_plain_name(name: str) -> bool:
     path = PurePosixPath(name)
     if not path.parts or path.is_absolute() or ".." in path.parts:
         return False

@@ -26,15 +26,17 @@ from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
 from study.tui.departure import leave_with_the_terminal
 from study.tui.engine.from_engine import Failed, Finished
-from study.tui.engine.to_engine import AskBeside, Begin, LetGo, Relay, Resume, SessionOrder, ShowSession
+from study.tui.engine.to_engine import AskOtherSession, Begin, LetGo, Relay, Resume, SessionOrder, ShowSession
 from study.tui.keys.key_names import key_name
 from study.tui.keys.keys_in_order import KeysInOrder
 from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
 from study.tui.themes import NEXT, register_themes
-from study.tui.watch.watching import Watching
+from study.tui.watch.watch_in_app import Watching
 
 
 class HapteqApp(App[None]):
+    """The application of `hapteq study`: draws screens, reads keys, and lets the engine do all other work."""
+
     TITLE = "hapteq"
     # At the top: the keys and what to press next stand at the bottom.
     CSS = "ToastRack { align: right top; } Toast { max-width: 76; }"
@@ -73,7 +75,7 @@ class HapteqApp(App[None]):
         return key_name(super().get_key_display(binding))
 
     async def on_mount(self) -> None:
-        leave_with_the_terminal(self, lambda: self._leave(ExitCode.INTERRUPTED))
+        leave_with_the_terminal(self, lambda: self._leave_app(ExitCode.INTERRUPTED))
         if self._start.first is not None:
             await self._sit(self._start.first)
         else:
@@ -146,35 +148,35 @@ class HapteqApp(App[None]):
                 case "home":
                     await self._archive.home()
                 case "quit":
-                    self._leave(ExitCode.DONE)
+                    self._leave_app(ExitCode.DONE)
 
         panel = OutcomeScreen(outcome)
         self.push_screen(panel, decided)
         self._keys.forget_earlier()
         return panel
 
-    def _leave(self, code: ExitCode) -> None:
+    def _leave_app(self, code: ExitCode) -> None:
         self.exit(return_code=int(code))
 
     def action_let_go(self) -> None:
         """Ctrl-C. First press: force off, and a panel. Second press: leave."""
         if self._sitting is None or self._letting_go is not None:
-            self._leave(ExitCode.INTERRUPTED)
+            self._leave_app(ExitCode.INTERRUPTED)
             return
         self._engine.send(LetGo())
-        panel = self._letting_go = self._panel(outcomes.letting_go(self._words), "")
+        panel = self._letting_go = self._panel(outcomes.stop_told_panel(self._words), "")
         self.set_timer(outcomes.UNHEARD_AFTER_S, lambda: self._unheard(panel))
 
     def _unheard(self, panel: OutcomeScreen) -> None:
         if self._letting_go is panel:
-            panel.tell(outcomes.unheard(self._words))
+            panel.tell(outcomes.stop_unanswered_panel(self._words))
             self.bell()
 
     async def action_quit(self) -> None:
         if self._sitting is not None:
             self.action_let_go()
         else:
-            self._leave(ExitCode.DONE)
+            self._leave_app(ExitCode.DONE)
 
     def action_help(self) -> None:
         from study.tui.screens.help import HelpScreen
@@ -252,7 +254,7 @@ class HapteqApp(App[None]):
         await self._archive.diagnose(wanted)
 
     def on_watch_wanted(self, wanted: home_messages.WatchWanted) -> None:
-        self._watching.confirm(wanted.path, lambda request: self._engine.send(AskBeside(wanted.path, request)))
+        self._watching.confirm(wanted.path, lambda request: self._engine.send(AskOtherSession(wanted.path, request)))
 
     def on_demo_screen_pause_wanted(self) -> None:
         self.action_pause()

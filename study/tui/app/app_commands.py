@@ -9,7 +9,7 @@ from typing import Any
 from textual.app import App, SystemCommand
 from textual.screen import Screen
 
-TWINS = {
+EQUIVALENT_LAWS = {
     "begin": "hapteq study --subject CODE",
     "resume": "hapteq resume SESSION",
     "decide('resume')": "hapteq resume SESSION",
@@ -59,6 +59,6 @@ def commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
             continue
         listed.add(action)
         key = app.get_key_display(binding)
-        twin = TWINS.get(action)
+        twin = EQUIVALENT_LAWS.get(action)
         run = partial(app.run_action, binding.action, active.node)
         yield SystemCommand(title, f"Key: {key}.{f' In a terminal: {twin}' if twin else ''}", run)

@@ -8,6 +8,8 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 
 @dataclass(frozen=True, slots=True)
 class AppStart:
+    """Options of the command line: data folder, device, keys, and what is offered first."""
+
     data: str
     device: str
     keys: AnswerKeys = DIGITS

@@ -60,6 +60,7 @@ ArchiveWanted = SessionWanted | DiagnosisWanted | AnalyzeWanted | WithdrawWanted
 
 
 def command_for(wanted: ArchiveWanted) -> ToEngine:
+    """The engine's command for a request of a screen."""
     match wanted:
         case SessionWanted(path=path):
             return ShowSession(path)
@@ -80,6 +81,8 @@ def command_for(wanted: ArchiveWanted) -> ToEngine:
 
 
 class ArchiveScreens:
+    """Shows the start screen, past sessions and diagnoses, and passes their requests to the engine."""
+
     def __init__(self, app: App[Any], send: Callable[[ToEngine], None], start: AppStart) -> None:
         self._app = app
         self._send = send

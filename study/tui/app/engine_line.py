@@ -12,15 +12,20 @@ from study.tui.engine.from_engine import Failed, Finished, FromEngine
 from study.tui.engine.to_engine import Begin, Heartbeat, Resume, ToEngine
 
 HEARTBEAT_S = 0.1
+"""Interval of the application's sign of life to the engine (s)."""
 
 
 class EngineMessage(Message):
+    """A message of the engine as an event of the application."""
+
     def __init__(self, message: FromEngine) -> None:
         super().__init__()
         self.message = message
 
 
 class EngineLine:
+    """The application's connection to the engine: sends commands and heartbeats, delivers messages as events."""
+
     def __init__(self, app: App[Any]) -> None:
         self._app = app
         self._engine = EngineClient(self._deliver)

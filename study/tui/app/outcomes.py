@@ -5,13 +5,16 @@ from study.tui.engine.from_engine import Failed, Finished
 from study.tui.screens.outcome import Decision, Outcome
 
 UNHEARD_AFTER_S = 2.0
+"""Time without an answer of the engine to a stop (s) after which the panel says so."""
 
 
-def letting_go(words: Words) -> Outcome:
+def stop_told_panel(words: Words) -> Outcome:
+    """Panel after a stop was asked for: the engine was told."""
     return Outcome(words["stop_title"], (("", words["stop_told"]),), ("quit",), words=words)
 
 
-def unheard(words: Words) -> Outcome:
+def stop_unanswered_panel(words: Words) -> Outcome:
+    """Panel after the engine did not answer a stop in time."""
     told = words.fill("stop_unheard", {"seconds": f"{UNHEARD_AFTER_S:g}"})
     texts = (told, words["stop_safe"], words["stop_do_now"])
     return Outcome(words["stop_unheard_title"], tuple(("", text) for text in texts), ("quit",), words=words)

@@ -21,8 +21,8 @@ from study.tui.engine.from_engine import (
     FromEngine,
     LookUpdate,
     Opened,
+    ParticipantWords,
     Preparing,
-    Spoken,
     Trouble,
 )
 from study.tui.engine.to_engine import Reply, ToEngine
@@ -79,6 +79,7 @@ def forget_drawn_before(app: App[Any]) -> None:
 
 
 TROUBLE_FOR_S = 8.0
+"""Time for which a warning is shown (s)."""
 
 
 class SittingScreens:
@@ -113,15 +114,15 @@ class SittingScreens:
             case Close(number=number) if number == self._number:
                 self._drop()
             case LookUpdate():
-                self._look(message)
+                self._update_handle(message)
             case Feedback(correct=correct) if self._trial is not None:
                 self._trial.show_saved()
                 self._trial.show_feedback(correct)
             case Trouble(sentence=sentence):
-                self._trouble(sentence)
+                self._show_trouble(sentence)
             case Opened(path=path):
                 self.path = path
-            case Spoken(words=words):
+            case ParticipantWords(words=words):
                 self.words = words
                 if self._preparing is not None:
                     self._preparing.speak(words)
@@ -164,11 +165,11 @@ class SittingScreens:
         await self._app.push_screen(self._trial)
         return self._trial
 
-    def _look(self, update: LookUpdate) -> None:
+    def _update_handle(self, update: LookUpdate) -> None:
         if update.number == self._number and isinstance(self._shown, HandleScreen):
             self._shown.update_view(update.view)
 
-    def _trouble(self, sentence: str) -> None:
+    def _show_trouble(self, sentence: str) -> None:
         sentence = self.words.fact(sentence)
         if self._trial is not None:
             self._trial.show_trouble(sentence)

@@ -26,7 +26,7 @@ def sentence(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORD
 def ends(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORDS) -> str:
     """Both ends of a direction in words, such as "up-left to down-right"."""
     angle = picture.angle_deg[number - 1]
-    start, end = _end(picture.plane, angle, words), _end(picture.plane, angle + 180, words)
+    start, end = _end_text(picture.plane, angle, words), _end_text(picture.plane, angle + 180, words)
     return words.fill("direction_ends", {"start": start, "end": end})
 
 
@@ -44,7 +44,7 @@ def draw_large_direction(picture: DirectionPicture, number: int, columns: int, r
     canvas = Canvas(columns, rows)
     right, up = _on_screen(picture.plane, picture.angle_deg[number - 1])
     x, y = canvas.middle
-    reach = _reach(picture, x, y)
+    reach = _half_length(picture, x, y)
     thick = max(2.5, reach / 8)
     head = 2.6 * thick
     shaft = reach - head
@@ -55,19 +55,19 @@ def draw_large_direction(picture: DirectionPicture, number: int, columns: int, r
     for side in (-1, 1):
         base = side * shaft
         canvas.fill((at(side * reach), at(base, 1.5 * thick), at(base, -1.5 * thick)))
-    for begin, end in ((-shaft, shaft),) if number == 1 else _dashes(shaft, 2.2 * thick, 1.1 * thick):
+    for begin, end in ((-shaft, shaft),) if number == 1 else _dash_ends(shaft, 2.2 * thick, 1.1 * thick):
         canvas.stroke(at(begin), at(end), thick)
     return tuple(canvas.lines())
 
 
-def _reach(picture: DirectionPicture, x: float, y: float) -> float:
+def _half_length(picture: DirectionPicture, x: float, y: float) -> float:
     """Half length of a segment, the same for both: neither may look stronger."""
     sides = [_on_screen(picture.plane, angle) for angle in picture.angle_deg]
     fits = min(min(x / max(abs(right), 1e-9), y / max(abs(up), 1e-9)) for right, up in sides)
     return min(fits, 1.25 * min(x, y))
 
 
-def _dashes(half_length: float, dash: float, gap: float) -> list[tuple[float, float]]:
+def _dash_ends(half_length: float, dash: float, gap: float) -> list[tuple[float, float]]:
     """Begin and end of each dash, evenly spaced, with a gap at both ends."""
     count = max(1, round((2 * half_length - gap) / (dash + gap)))
     stretch = 2 * half_length / (count * dash + (count + 1) * gap)
@@ -97,7 +97,7 @@ def _on_screen(plane: str, angle_deg: float) -> tuple[float, float]:
     return c * first[0] + s * second[0], c * first[1] + s * second[1]
 
 
-def _end(plane: str, angle_deg: float, words: Words) -> str:
+def _end_text(plane: str, angle_deg: float, words: Words) -> str:
     (first_plus, first_minus), (second_plus, second_minus) = ENDS[plane]
     c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
     along_second = words[second_plus if s > 0 else second_minus]

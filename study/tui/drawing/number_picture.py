@@ -14,6 +14,7 @@ _STROKES: dict[int, tuple[Point, ...]] = {
 
 @lru_cache(maxsize=16)
 def large_number(number: int, columns: int, rows: int) -> tuple[str, ...]:
+    """The digit 1 or 2 as large as fits, as lines of braille characters."""
     canvas = Canvas(columns, rows)
     x, y = canvas.middle
     thick = max(2.5, y / 5)

@@ -38,7 +38,7 @@ class EngineClient:
         self._opened: Opened | None = None
         self.dead = False
         """The engine ended by itself; a new client can be started."""
-        self._thread = threading.Thread(target=self._live, name="engine-client", daemon=True)
+        self._thread = threading.Thread(target=self._run_thread, name="engine-client", daemon=True)
 
     @property
     def pid(self) -> int | None:
@@ -66,7 +66,7 @@ class EngineClient:
             process.kill()
             process.wait()
 
-    def _live(self) -> None:
+    def _run_thread(self) -> None:
         with tempfile.TemporaryFile() as output:
             try:
                 connection, process = start_child("study.tui.engine.engine", "run", output=output)

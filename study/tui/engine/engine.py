@@ -39,6 +39,8 @@ INTERRUPTED = StudyError(
 
 
 class Engine:
+    """Performs the screen's commands one after another until the screen is gone; signals interrupt the current one."""
+
     def __init__(self, connection: Connection) -> None:
         self._busy = False
         self._link = ScreenLink(connection, self._interrupt, _end_by_force)
@@ -83,7 +85,7 @@ class Engine:
         except Exception as bug:  # noqa: BLE001 - the screen must say it, and the device is closed
             self._busy = False
             traceback.print_exc()
-            self._fail(_bug(bug), ExitCode.ERROR)
+            self._fail(_bug_error(bug), ExitCode.ERROR)
         finally:
             self._busy = False
 
@@ -122,7 +124,7 @@ def _end_by_force() -> None:
     os._exit(1)
 
 
-def _bug(bug: Exception) -> StudyError:
+def _bug_error(bug: Exception) -> StudyError:
     return StudyError(
         "Something in hapteq went wrong",
         f"{type(bug).__name__}: {bug}.",

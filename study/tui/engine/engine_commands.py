@@ -25,11 +25,11 @@ from study.tui.engine.from_engine import (
     Home,
     LayDown,
     Opened,
+    ParticipantWords,
     Preparing,
     Results,
     SensorKept,
     Session,
-    Spoken,
     Trouble,
     Withdrawn,
     Working,
@@ -38,7 +38,7 @@ from study.tui.engine.remote_display import RemoteDisplay
 from study.tui.engine.screen_link import ScreenLink
 from study.tui.engine.to_engine import (
     Analyze,
-    AskBeside,
+    AskOtherSession,
     Begin,
     CalibrateSensor,
     Command,
@@ -54,10 +54,10 @@ from study.tui.engine.to_engine import (
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_results
 from study.workflows.results.written_analysis import WrittenAnalysis
-from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
+from study.workflows.session.conduct_session import ConductedSitting, Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting, finish_closed
 from study.workflows.session.plan_sitting import plan_sitting
-from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
+from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
 from study.workflows.trial.display import PersonsHand
 from study.workflows.views.list_sessions import home_view, model_words, protocol_line
 from study.workflows.views.send_request import send_request
@@ -100,7 +100,7 @@ class EngineCommands:
                 self._diagnose(command)
             case CalibrateSensor() | KeepSensor():
                 self._calibrate(command)
-            case AskBeside(session=session, request=request):
+            case AskOtherSession(session=session, request=request):
                 send_request(SessionFolder(Path(session)), request, self._clock)
 
     def _begin(self, order: SessionOrder) -> None:
@@ -109,7 +109,7 @@ class EngineCommands:
         for note in plan.notes:
             self._link.send(Trouble(note))
         words = words_of(plan.session.protocol)
-        self._sit(words, lambda participant: conduct_new(plan.session, order.device, participant))
+        self._conduct_sitting(words, lambda participant: conduct_new(plan.session, order.device, participant))
 
     def _resume(self, command: Resume) -> None:
         folder = find_session(command.session, Path(command.data))
@@ -130,10 +130,10 @@ class EngineCommands:
             self._link.send(Finished(str(folder.path), folded.state.answers, _results(written)))
             return
         words = words_of(folded.state.protocol)
-        self._sit(words, lambda participant: conduct_resumed(folder, command.device, participant))
+        self._conduct_sitting(words, lambda participant: conduct_resumed(folder, command.device, participant))
 
-    def _sit(self, words: Words, conduct: Callable[[Participant], Conducted]) -> None:
-        self._link.send(Spoken(words))
+    def _conduct_sitting(self, words: Words, conduct: Callable[[Participant], ConductedSitting]) -> None:
+        self._link.send(ParticipantWords(words))
         self._link.send(Preparing(words["preparing_device"]))
         with self._participant() as participant:
             end = conduct(participant)
@@ -150,18 +150,18 @@ class EngineCommands:
         self._link.forget_replies()
         display = RemoteDisplay(self._link, self._clock)
         try:
-            yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._hear)
+            yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._report_requests)
         finally:
             self._link.stop_device = None
 
-    def _hear(self, folder: SessionFolder, device: Device) -> None:
+    def _report_requests(self, folder: SessionFolder, device: Device) -> None:
         self.opened = folder
         self._link.stop_device = device.stop
         self._link.send(Opened(folder.name, str(folder.path)))
 
     def _withdraw(self, folder: SessionFolder) -> None:
         data, plan = folder.path.parent, plan_withdrawal(folder)
-        elsewhere = still_elsewhere(data, plan)
+        elsewhere = copies_elsewhere(data, plan)
         withdraw(data, plan, self._clock.utc())
         for sentence in (*plan.doubtful, *elsewhere):
             self._link.send(Trouble(sentence))

@@ -52,6 +52,8 @@ class Close:
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
+    """Whether an answer was right, where the protocol shows it."""
+
     correct: bool
 
 
@@ -64,21 +66,27 @@ class Trouble:
 
 @dataclass(frozen=True, slots=True)
 class Home:
+    """Content of the start screen."""
+
     view: HomeView
 
 
 @dataclass(frozen=True, slots=True)
 class Session:
+    """Content of a past session's screen."""
+
     view: SessionView
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
+    """Content of a diagnosis' screen."""
+
     view: DiagnosisView
 
 
 @dataclass(frozen=True, slots=True)
-class Spoken:
+class ParticipantWords:
     """What the participant of the sitting reads, from here on."""
 
     words: Words
@@ -121,6 +129,8 @@ class Calibrated:
 
 @dataclass(frozen=True, slots=True)
 class SensorKept:
+    """The calibration was written to this file."""
+
     file: str
 
 
@@ -192,7 +202,7 @@ FromEngine = (
     | Session
     | Diagnosis
     | Preparing
-    | Spoken
+    | ParticipantWords
     | Working
     | LayDown
     | Calibrated

@@ -55,14 +55,14 @@ class RemoteDisplay:
         """Longest delay of this program's own wake-ups since a question was asked."""
 
     def fill_in(self, form: Form) -> FormReply:
-        reply: FormReply = self._ask(Call.FILL_IN, form)
+        reply: FormReply = self._ask_screen(Call.FILL_IN, form)
         return reply
 
     def device_checked(self, report: DeviceReport) -> bool:
-        return bool(self._ask(Call.DEVICE_CHECKED, report))
+        return bool(self._ask_screen(Call.DEVICE_CHECKED, report))
 
     def welcome(self, notice: Welcome) -> None:
-        self._ask(Call.WELCOME, notice)
+        self._ask_screen(Call.WELCOME, notice)
 
     def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
         number = self._show(Call.CHOOSE_DEMO, menu)
@@ -80,12 +80,12 @@ class RemoteDisplay:
         while (left_s := until_s - self._clock.now_s()) > 0:
             reply = self._reply(number, min(GLANCE_S, left_s))
             if not sign_of_life():
-                return self._over(number, CUT_SHORT)
+                return self._cut_short(number, CUT_SHORT)
             if reply is not None:
                 cut: Unanswered | None = reply.value
                 return cut
             if self._silent():
-                return self._over(number, silent(self._late_s, self._load()))
+                return self._cut_short(number, silent(self._late_s, self._load()))
         self._link.send(Close(number))
         return None
 
@@ -100,12 +100,12 @@ class RemoteDisplay:
                 number = self._show(Call.AWAIT_HANDLE, view)
             reply = self._reply(number)
             if not sign_of_life():
-                return self._over(number, CUT_SHORT)
+                return self._cut_short(number, CUT_SHORT)
             if reply is not None and number:
                 cut: Unanswered | None = reply.value
                 return cut
             if self._silent():
-                return self._over(number, silent(self._late_s, self._load()))
+                return self._cut_short(number, silent(self._late_s, self._load()))
             if self._clock.now_s() - looked_s >= LOOK_EVERY_S:
                 view, looked_s = look(), self._clock.now_s()
                 if number:
@@ -120,20 +120,20 @@ class RemoteDisplay:
         while True:
             reply = self._reply(number)
             if not sign_of_life():
-                return self._over(number, CUT_SHORT)
+                return self._cut_short(number, CUT_SHORT)
             if reply is not None:
                 answer: Answer = reply.value
                 return answer
             if self._silent():
-                return self._over(number, silent(self._late_s, self._load()))
+                return self._cut_short(number, silent(self._late_s, self._load()))
             if self._clock.now_s() > until_s:
-                return self._over(number, TOO_LATE)
+                return self._cut_short(number, TOO_LATE)
 
     def feedback(self, correct: bool) -> None:
         self._link.send(Feedback(correct))
 
     def practice_over(self, result: PracticeResult) -> None:
-        self._ask(Call.PRACTICE_OVER, result)
+        self._ask_screen(Call.PRACTICE_OVER, result)
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
         """The rest is enforced here: if the screen returns too early, the remaining time is waited."""
@@ -158,15 +158,15 @@ class RemoteDisplay:
         return AfterPause.LEAVE
 
     def await_return(self, reason: str) -> None:
-        self._ask(Call.AWAIT_RETURN, reason)
+        self._ask_screen(Call.AWAIT_RETURN, reason)
 
     def goodbye(self, notice: Goodbye) -> None:
-        self._ask(Call.GOODBYE, notice)
+        self._ask_screen(Call.GOODBYE, notice)
 
     def trouble(self, sentence: str) -> None:
         self._link.send(Trouble(sentence))
 
-    def _ask(self, call: Call, shown: Any) -> Any:
+    def _ask_screen(self, call: Call, shown: Any) -> Any:
         """Ask while nothing plays: a screen may be suspended for any time."""
         number = self._show(call, shown)
         while (reply := self._reply(number)) is None:
@@ -189,7 +189,7 @@ class RemoteDisplay:
     def _silent(self) -> bool:
         return self._link.silent_s() > SILENT_AFTER_S
 
-    def _over(self, number: int, why: Unanswered) -> Unanswered:
+    def _cut_short(self, number: int, why: Unanswered) -> Unanswered:
         """number: 0 where nothing is shown."""
         if number:
             self._link.send(Close(number))

@@ -80,7 +80,7 @@ class ScreenLink:
     def _listen(self) -> None:
         try:
             while True:
-                self._take(self._connection.recv())
+                self._handle_message(self._connection.recv())
         except (EOFError, OSError):
             pass
         except Exception:  # noqa: BLE001 - an engine that understands nothing any more must not go on
@@ -93,7 +93,7 @@ class ScreenLink:
             finally:
                 self._gone()
 
-    def _take(self, message: ToEngine) -> None:
+    def _handle_message(self, message: ToEngine) -> None:
         # Each message was sent by a living screen; only heartbeats come all the time.
         self._heard_s = time.monotonic()
         match message:

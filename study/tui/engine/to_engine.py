@@ -23,6 +23,8 @@ class SessionOrder:
 
 @dataclass(frozen=True, slots=True)
 class ShowHome:
+    """Read the data folder for the start screen."""
+
     data: str
     protocol: str = ""
     """What is offered first; so are device and model."""
@@ -32,21 +34,29 @@ class ShowHome:
 
 @dataclass(frozen=True, slots=True)
 class ShowSession:
+    """Read a past session."""
+
     path: str
 
 
 @dataclass(frozen=True, slots=True)
 class ShowDiagnosis:
+    """Read a diagnosis."""
+
     path: str
 
 
 @dataclass(frozen=True, slots=True)
 class Begin:
+    """Begin a session."""
+
     order: SessionOrder
 
 
 @dataclass(frozen=True, slots=True)
 class Resume:
+    """Resume a session after a crash or a pause."""
+
     session: str
     """Folder, or its name in the data folder."""
     device: str
@@ -97,7 +107,7 @@ class KeepSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class AskBeside:
+class AskOtherSession:
     """Ask a session that runs in another program."""
 
     session: str
@@ -140,8 +150,8 @@ Command = (
     | Diagnose
     | CalibrateSensor
     | KeepSensor
-    | AskBeside
+    | AskOtherSession
 )
-"""What the engine performs, one after another."""
+"""Commands that the engine performs one after another."""
 
 ToEngine = Command | Relay | LetGo | Heartbeat | Reply

@@ -9,7 +9,9 @@ from study.session.watching.watch_view import WatchView
 from study.tui.engine.child_process import start_child
 
 LOOK_EVERY_S = 0.2
+"""Interval at which the log is read (s)."""
 CLOSING_S = 2.0
+"""Longest wait for the child process to end (s)."""
 
 
 class WatchFeed:
@@ -80,12 +82,12 @@ def feed(descriptor: int, session_path: str) -> None:
             view = follower.look(clock.utc())
         except StudyError as error:
             view = None
-            _send(connection, f"{error.happened} {error.do_now}")
-        if view is not None and not _send(connection, view):
+            _send_view(connection, f"{error.happened} {error.do_now}")
+        if view is not None and not _send_view(connection, view):
             return
 
 
-def _send(connection: Connection, what: WatchView | str) -> bool:
+def _send_view(connection: Connection, what: WatchView | str) -> bool:
     try:
         connection.send(what)
     except OSError:

@@ -11,6 +11,8 @@ RESERVED = "pqrn?"
 
 @dataclass(frozen=True, slots=True)
 class AnswerKeys:
+    """The keys that answer 1 and 2."""
+
     first: str = "1"
     second: str = "2"
 

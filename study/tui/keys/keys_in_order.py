@@ -19,7 +19,7 @@ from study.tui.keys.key_presses import arrival_s
 AT_ONCE = ("ctrl+c", "ctrl+q", "ctrl+z")
 """Remove the force, or suspend: never queued."""
 ROUNDS = 3
-"""From a widget to the application: the key itself, the message that it becomes, and its effects."""
+"""Rounds of the event loop until a key has had its effect: the key, the message that it becomes, its handler."""
 PATIENCE_S = 1.0
 """A widget that is busy for longer does not delay further keys."""
 

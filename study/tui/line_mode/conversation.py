@@ -13,10 +13,13 @@ from study.workflows.trial.display import SignOfLife
 GLANCE_S = 0.05
 """Interval of the signs of life: half of what the port allows."""
 LINE_WIDTH = 78
+"""Characters per line: two less than the narrowest usual terminal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
+    """A line that was typed."""
+
     text: str
     at_s: float
     """Clock time at which it arrived."""
@@ -36,6 +39,8 @@ class WaitOver(Enum):
 
 
 class Conversation:
+    """Dialogue with the participant in lines of text, in the words of the protocol's language."""
+
     def __init__(self, lines: LineInput, out: TextIO, clock: Clock, words: Words = ENGLISH_WORDS) -> None:
         self._lines = lines
         self._out = out

@@ -21,7 +21,7 @@ class LineInput:
         ready, _, _ = select.select([self._descriptor], [], [], timeout_s)
         if not ready:
             return None
-        if not self._fetch():
+        if not self._read_available():
             raise EOFError
         return self._take_line()
 
@@ -30,7 +30,7 @@ class LineInput:
         while b"\n" not in self._pending and not self._over:
             if not select.select([self._descriptor], [], [], 0.0)[0]:
                 return False
-            self._fetch()
+            self._read_available()
         return b"\n" not in self._pending
 
     def forget(self) -> None:
@@ -42,7 +42,7 @@ class LineInput:
         termios.tcflush(self._descriptor, termios.TCIFLUSH)
         self._pending = b""
 
-    def _fetch(self) -> bool:
+    def _read_available(self) -> bool:
         """Read what is there. False at the end of the input."""
         data = os.read(self._descriptor, 4096)
         self._over = not data

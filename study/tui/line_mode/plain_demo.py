@@ -20,9 +20,10 @@ INPUT_ENDED = Unanswered(WaitOver.INPUT_ENDED.value, leave=True)
 
 
 def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> DemoChoice:
+    """Ask which direction of which vibration to play. Raises KeyboardInterrupt when the participant leaves."""
     talk.forget()
     vibration = menu.vibration
-    talk.say("", _place(menu, vibration, talk.words))
+    talk.say("", _place_text(menu, vibration, talk.words))
     while True:
         talk.prompt(talk.words.fill("line_demo_prompt", {"keys": keys.choice(talk.words)}))
         line = talk.wait(sign_of_life)
@@ -57,6 +58,7 @@ def show_playing(notice: PlayingNotice, talk: Conversation, sign_of_life: SignOf
 
 
 def await_handle(look: Callable[[], HandleView], talk: Conversation, sign_of_life: SignOfLife) -> Unanswered | None:
+    """Wait until the handle is at its place, saying how far it is. None once it is; otherwise why the wait ended."""
     talk.forget()
     last_sentence, said_at_s = "", float("-inf")
     while not (view := look()).ready:
@@ -85,10 +87,10 @@ def _step_vibration(menu: DemoMenu, vibration: int, step: int, words: Words) -> 
         return vibration, words["line_demo_first"]
     if turned > menu.vibrations:
         return vibration, words["line_demo_last"]
-    return turned, _place(menu, turned, words)
+    return turned, _place_text(menu, turned, words)
 
 
-def _place(menu: DemoMenu, vibration: int, words: Words) -> str:
+def _place_text(menu: DemoMenu, vibration: int, words: Words) -> str:
     place = words.fill("line_demo_place", {"vibration": vibration, "vibrations": menu.vibrations})
     moves = "" if menu.handle_moves else f" {words['simulation']}"
     return f"{place} {felt_so_far(menu, vibration, words)}{moves}"

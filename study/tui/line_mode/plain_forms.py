@@ -11,6 +11,7 @@ BACK = "b"
 
 
 def fill_in(form: Form, talk: Conversation) -> FormReply:
+    """Ask all fields of a form, one after another; `b` goes back by one."""
     talk.forget()
     words = talk.words
     talk.say("", form.title, *filter(None, (form.introduction, origin(form, words))))
@@ -23,7 +24,7 @@ def fill_in(form: Form, talk: Conversation) -> FormReply:
                 return FormReply(answers)
             at, changed = 0, False
         field = form.fields[at]
-        answer = _ask(field, (at + 1, len(form.fields)), talk)
+        answer = _ask_field(field, (at + 1, len(form.fields)), talk)
         if answer is None:
             at = max(0, at - 1)
             continue
@@ -48,6 +49,7 @@ def _confirm_changes(form: Form, answers: dict[str, str], talk: Conversation) ->
 
 
 def device_checked(report: DeviceReport, talk: Conversation) -> bool:
+    """Print the findings of the device check. True: go on; False: check again."""
     talk.forget()
     words = talk.words
     moves = f" {words['simulation']}" if report.simulated else ""
@@ -68,7 +70,7 @@ def device_checked(report: DeviceReport, talk: Conversation) -> bool:
         talk.refuse("no_answer", line)
 
 
-def _ask(field: FormField, place: tuple[int, int], talk: Conversation) -> str | None:
+def _ask_field(field: FormField, place: tuple[int, int], talk: Conversation) -> str | None:
     """The answer; None: back to the previous question."""
     numbered = bool(field.choices) and not any(choice.isdigit() for choice in field.choices)
     words = talk.words

@@ -10,9 +10,11 @@ from study.tui.trial_words import progress_sentence
 from study.workflows.trial.display import SignOfLife
 
 COUNT_EVERY_S = 10.0
+"""Interval at which the remaining time is printed (s)."""
 
 
 def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> float:
+    """Count down an enforced rest. Returns its duration (s). Raises KeyboardInterrupt when the participant leaves."""
     words = talk.words
     rested = words.fill("line_rest", {"seconds": f"{notice.seconds:.0f}"})
     talk.say("", f"{rested} {words.counted('runs_left', notice.runs_left)}")
@@ -31,6 +33,7 @@ def rest(notice: RestNotice, talk: Conversation, sign_of_life: SignOfLife) -> fl
 def pause(
     notice: PauseNotice, talk: Conversation, note: Callable[[NoteAsked], None] | None, sign_of_life: SignOfLife
 ) -> AfterPause:
+    """Wait in a pause until the participant decides how to continue. note: writes a note into the log."""
     talk.forget()
     words = talk.words
     paused = words.fill("line_pause", {"reason": words.fact(notice.reason)})

@@ -23,6 +23,7 @@ LEFT = Unanswered("the participant left", leave=True)
 
 
 def keys_sentence(keys: AnswerKeys, words: Words) -> str:
+    """Which keys answer 1 and 2."""
     return words.fill("line_keys", {"keys": keys.choice(words)})
 
 
@@ -32,6 +33,7 @@ def picture_lines(picture: DirectionPicture, words: Words) -> tuple[str, ...]:
 
 
 def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
+    """Print title, instructions and plan of a sitting, and wait for Enter."""
     words = talk.words
     talk.forget()
     talk.say(notice.title, "")
@@ -53,6 +55,7 @@ def welcome(notice: Welcome, talk: Conversation, keys: AnswerKeys) -> None:
 
 
 def ask(question: Question, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
+    """Ask the question of a trial until there is a reply, the time is over or the stimulus has ended."""
     words, choice = talk.words, {"keys": keys.choice(talk.words)}
     talk.forget()
     talk.say("", heading(question, words))
@@ -94,6 +97,7 @@ def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
 
 
 def practice_over(result: PracticeResult, talk: Conversation) -> None:
+    """Print the result of a practice, and wait for Enter."""
     talk.forget()
     talk.say("", talk.words.fill("line_practice", {"right": result.right, "asked": result.of}))
     talk.speak("practice_enough" if result.passed else "practice_hard", "enter_goes_on")

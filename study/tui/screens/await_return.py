@@ -8,13 +8,15 @@ from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import void_words
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 
-class AwaitReturnScreen(SpokenScreen[None]):
+class AwaitReturnScreen(TranslatedScreen[None]):
+    """Waits for Enter after a void trial; nothing is played meanwhile."""
+
     PAGE = "help_void"
     DEFAULT_CSS = "AwaitReturnScreen { align: center middle; }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on", key_display="Enter")]

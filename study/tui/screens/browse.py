@@ -40,6 +40,8 @@ def _is_ours(path: Path) -> bool:
 
 
 class BrowseScreen(ModalScreen[None]):
+    """A tree of folders, in which a session or a diagnosis is picked."""
+
     HELP = HELP
     CSS = """
     BrowseScreen { align: center middle; }
@@ -47,7 +49,7 @@ class BrowseScreen(ModalScreen[None]):
         width: 90%; max-width: 100; height: 90%; border: round $primary; padding: 0 1; background: $surface;
     }
     BrowseScreen HapteqFiles { height: 1fr; background: $surface; }
-    BrowseScreen #said { height: 1; color: $foreground 65%; }
+    BrowseScreen #message { height: 1; color: $foreground 65%; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Back", key_display="Esc"),
@@ -63,30 +65,30 @@ class BrowseScreen(ModalScreen[None]):
             box.border_title = "Open a session or a diagnosis"
             yield Input(str(self._folder.absolute()), compact=True, id="path")
             yield HapteqFiles(self._folder.absolute(), id="tree")
-            yield Static("", id="said", markup=False)
+            yield Static("", id="message", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._say(f"{LOG}: a session. {DIAGNOSIS}: a diagnosis.")
+        self._show_message(f"{LOG}: a session. {DIAGNOSIS}: a diagnosis.")
         self.query_one(HapteqFiles).focus()
 
     @on(Input.Submitted, "#path")
-    def _go(self, typed: Input.Submitted) -> None:
+    def _go_to_path(self, typed: Input.Submitted) -> None:
         path = Path(typed.value).expanduser()
         if path.is_dir() and (path / LOG).exists():
-            self._open(path / LOG)
+            self._open_path(path / LOG)
         elif path.is_dir():
             tree = self.query_one(HapteqFiles)
             tree.path = path
             tree.focus()
         elif path.is_file():
-            self._open(path)
+            self._open_path(path)
         else:
-            self._say(f"There is nothing at {path}.")
+            self._show_message(f"There is nothing at {path}.")
 
     @on(DirectoryTree.FileSelected)
     def _open_selected(self, selected: DirectoryTree.FileSelected) -> None:
-        self._open(selected.path)
+        self._open_path(selected.path)
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(HELP))
@@ -94,10 +96,10 @@ class BrowseScreen(ModalScreen[None]):
     def action_leave(self) -> None:
         dismiss_screen(self, None)
 
-    def _open(self, path: Path) -> None:
+    def _open_path(self, path: Path) -> None:
         wanted = SessionWanted(str(path.parent)) if path.name == LOG else DiagnosisWanted(str(path))
         self.app.post_message(wanted)
         dismiss_screen(self, None)
 
-    def _say(self, text: str) -> None:
-        self.query_one("#said", Static).update(text)
+    def _show_message(self, text: str) -> None:
+        self.query_one("#message", Static).update(text)

@@ -35,7 +35,7 @@ class ConfirmView(ModalScreen[bool]):
     ConfirmView { align: center middle; }
     ConfirmView Card { border: round $warning; }
     ConfirmView Input { margin-top: 1; }
-    ConfirmView #said { height: 1; color: $text-error; }
+    ConfirmView #message { height: 1; color: $text-error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Back", key_display="Esc"),
@@ -54,7 +54,7 @@ class ConfirmView(ModalScreen[bool]):
             )
             yield LiteralText(f"To open it, type {self._session} and press Enter.", classes="gap strong")
             yield Input(compact=True)
-            yield LiteralText(id="said")
+            yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
@@ -62,7 +62,7 @@ class ConfirmView(ModalScreen[bool]):
         if typed.value.strip() == self._session:
             dismiss_screen(self, True)
         else:
-            self.query_one("#said", LiteralText).update(f"That is not {self._session}. Nothing is opened.")
+            self.query_one("#message", LiteralText).update(f"That is not {self._session}. Nothing is opened.")
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(self.HELP))

@@ -10,12 +10,12 @@ from textual.widgets import Footer, Input
 
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 
-class ConfirmWithdrawal(SpokenScreen[bool], ModalScreen[bool]):
+class ConfirmWithdrawal(TranslatedScreen[bool], ModalScreen[bool]):
     """Returns True if the word was typed."""
 
     PAGE = "help_withdraw"
@@ -23,7 +23,7 @@ class ConfirmWithdrawal(SpokenScreen[bool], ModalScreen[bool]):
     ConfirmWithdrawal { align: center middle; }
     ConfirmWithdrawal Card { border: round $error; }
     ConfirmWithdrawal Input { margin-top: 1; }
-    ConfirmWithdrawal #said { height: 1; color: $text-error; }
+    ConfirmWithdrawal #message { height: 1; color: $text-error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Keep everything", key_display="Esc"),
@@ -36,7 +36,7 @@ class ConfirmWithdrawal(SpokenScreen[bool], ModalScreen[bool]):
             yield LiteralText(words["withdraw_all"])
             yield LiteralText(words.fill("withdraw_how", {"word": words["withdraw_word"]}), classes="gap strong")
             yield Input(compact=True)
-            yield LiteralText(id="said")
+            yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
@@ -45,7 +45,7 @@ class ConfirmWithdrawal(SpokenScreen[bool], ModalScreen[bool]):
         if typed.value.strip().casefold() == word.casefold():
             dismiss_screen(self, True)
         else:
-            self.query_one("#said", LiteralText).update(self.words.fill("withdraw_other", {"word": word}))
+            self.query_one("#message", LiteralText).update(self.words.fill("withdraw_other", {"word": word}))
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(self.HELP, self.words))

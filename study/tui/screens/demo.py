@@ -13,19 +13,21 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import felt_so_far
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
 
-class DemoScreen(SpokenScreen[DemoChoice]):
+class DemoScreen(TranslatedScreen[DemoChoice]):
+    """Plays either direction at each vibration on request; dismissed with the choice."""
+
     PAGE = "help_demo"
     DEFAULT_CSS = """
     DemoScreen #title { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
     DemoScreen #steps { height: 1; margin: 0 1; text-align: center; }
     DemoScreen #answers { height: 1fr; margin: 0 1; }
-    DemoScreen #said { height: 1; margin: 0 1; text-align: center; text-style: bold; }
+    DemoScreen #message { height: 1; margin: 0 1; text-align: center; text-style: bold; }
     DemoScreen #note { height: 2; margin: 0 1; text-align: center; color: $text-warning; }
     """
     AUTO_FOCUS = ""
@@ -54,7 +56,7 @@ class DemoScreen(SpokenScreen[DemoChoice]):
         with Horizontal(id="answers"):
             yield DirectionPanel(1, self._menu.picture, self.words)
             yield DirectionPanel(2, self._menu.picture, self.words)
-        yield LiteralText(id="said")
+        yield LiteralText(id="message")
         yield LiteralText("" if self._menu.handle_moves else self.words["simulation"], id="note")
         yield Footer(show_command_palette=False)
 
@@ -100,7 +102,7 @@ class DemoScreen(SpokenScreen[DemoChoice]):
         self.query_one("#steps", LiteralText).update("  ".join(self._step(v + 1) for v in range(menu.vibrations)))
         for panel in self.query(DirectionPanel):
             panel.mark = "felt" if (self._vibration, panel.number) in menu.felt else ""
-        self.query_one("#said", LiteralText).update(sentence)
+        self.query_one("#message", LiteralText).update(sentence)
 
     def _step(self, vibration: int) -> str:
         ticks = "".join("✓" if (vibration, number) in self._menu.felt else "·" for number in (1, 2))

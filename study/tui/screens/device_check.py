@@ -9,12 +9,12 @@ from textual.widgets import Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.literal_text import LiteralText
 
 
-class DeviceCheckScreen(SpokenScreen[bool]):
+class DeviceCheckScreen(TranslatedScreen[bool]):
     """True: go on. False: check again."""
 
     PAGE = "help_check"

@@ -41,6 +41,8 @@ FIELDS = (
 
 
 class DiagnoseForm(ModalScreen[None]):
+    """Asks for recordings and model of a diagnosis, and checks the paths."""
+
     HELP = HELP
     CSS = """
     DiagnoseForm { align: center middle; }
@@ -50,7 +52,7 @@ class DiagnoseForm(ModalScreen[None]):
     DiagnoseForm .field { height: auto; }
     DiagnoseForm Label { width: 13; }
     DiagnoseForm Input { width: 1fr; }
-    DiagnoseForm #said { height: 2; margin-top: 1; color: $text-error; }
+    DiagnoseForm #message { height: 2; margin-top: 1; color: $text-error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f5", "begin", "Diagnose", priority=True),
@@ -70,7 +72,7 @@ class DiagnoseForm(ModalScreen[None]):
                     yield Label(title)
                     first = shlex.quote(self._source) if name == "sources" and self._source else ""
                     yield Input(first, placeholder=hint, compact=True, id=name)
-            yield Static("", id="said", markup=False)
+            yield Static("", id="message", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -83,7 +85,7 @@ class DiagnoseForm(ModalScreen[None]):
             try:
                 named[field] = tuple(str(Path(word).expanduser()) for word in shlex.split(self._text_of(field)))
             except ValueError:
-                self._say("A quotation mark is open.", field)
+                self._show_message("A quotation mark is open.", field)
                 return
         sources = named["sources"]
         model, out = (
@@ -91,11 +93,11 @@ class DiagnoseForm(ModalScreen[None]):
         )
         missing = next(((f, path) for f, paths in named.items() for path in paths if not Path(path).exists()), None)
         if not sources:
-            self._say("Name a recording, or the folder of a session.", "sources")
+            self._show_message("Name a recording, or the folder of a session.", "sources")
         elif missing is not None:
-            self._say(f"There is nothing at {missing[1]}.", missing[0])
+            self._show_message(f"There is nothing at {missing[1]}.", missing[0])
         elif model and not Path(model).is_file():
-            self._say(f"There is no file {model}.", "model")
+            self._show_message(f"There is no file {model}.", "model")
         elif self.is_active:
             self.app.post_message(DiagnoseWanted(sources, model, out, named["clean"]))
             dismiss_screen(self, None)
@@ -109,6 +111,6 @@ class DiagnoseForm(ModalScreen[None]):
     def _text_of(self, name: str) -> str:
         return self.query_one(f"#{name}", Input).value.strip()
 
-    def _say(self, text: str, field: str) -> None:
-        self.query_one("#said", Static).update(text)
+    def _show_message(self, text: str, field: str) -> None:
+        self.query_one("#message", Static).update(text)
         self.query_one(f"#{field}", Input).focus()

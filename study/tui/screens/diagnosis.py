@@ -36,6 +36,8 @@ In a terminal: `hapteq show diagnosis.json`.
 
 
 class DiagnosisScreen(Screen[None]):
+    """A finished diagnosis on one page, in two columns where the terminal is wide."""
+
     HELP = HELP
     CSS = """
     DiagnosisScreen #head { height: 1; padding: 0 1; background: $primary-muted; }
@@ -66,11 +68,11 @@ class DiagnosisScreen(Screen[None]):
             yield Static(view.verdict, id="verdict", markup=False)
             with Container(id="halves"):
                 with Container(classes="half"):
-                    yield from _said("Effects", view.sentences, "No effect is named.")
+                    yield from _compose_section("Effects", view.sentences, "No effect is named.")
                     if view.candidates:
-                        yield from _said("Candidates, not confirmed", view.candidates, "")
-                    yield from _said("Rivals, and why not", view.rivals, "No other effect came near.")
-                    yield from _said(
+                        yield from _compose_section("Candidates, not confirmed", view.candidates, "")
+                    yield from _compose_section("Rivals, and why not", view.rivals, "No other effect came near.")
+                    yield from _compose_section(
                         "Next", tuple(view.next_experiment.splitlines()), "No further recording is asked for."
                     )
                 with Container(classes="half"):
@@ -93,7 +95,7 @@ class DiagnosisScreen(Screen[None]):
         return action != "open_report" or bool(self._view.report)
 
 
-def _said(title: str, sentences: tuple[str, ...], none: str) -> ComposeResult:
+def _compose_section(title: str, sentences: tuple[str, ...], none: str) -> ComposeResult:
     yield Static(title, classes="title", markup=False)
     bullets = Table.grid(padding=(0, 1, 0, 0))
     for sentence in sentences or (none,):

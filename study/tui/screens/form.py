@@ -24,7 +24,7 @@ from study.session.views.form_entry import (
 )
 from study.session.views.form_views import Form, FormReply, find_missing_fields
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import limits_words, origin
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.choice_row import ChoiceRow
@@ -46,7 +46,7 @@ KEYS = (
 FOOTER_KEYS = frozenset(key for key, *_ in KEYS)
 
 
-class FormScreen(SpokenScreen[FormReply]):
+class FormScreen(TranslatedScreen[FormReply]):
     """Shows a `FormEntry`. No widget in it has the focus: keys, clicks and pastes come to the screen in order, and
     each is applied to the entry before the next."""
 
@@ -56,7 +56,7 @@ class FormScreen(SpokenScreen[FormReply]):
     FormScreen #top { height: 1; padding: 0 1; background: $panel; text-style: bold; }
     FormScreen #introduction { margin: 1 0; }
     FormScreen #origin { color: $foreground 65%; margin-bottom: 1; }
-    FormScreen #said { height: 1; padding: 0 1; text-align: center; text-style: bold; }
+    FormScreen #message { height: 1; padding: 0 1; text-align: center; text-style: bold; }
     FormScreen Button { margin: 0 0 1 2; }
     FormScreen Button.-at { text-style: bold reverse; }
     """
@@ -90,7 +90,7 @@ class FormScreen(SpokenScreen[FormReply]):
             button = Button(self.words["key_continue"], variant="primary", compact=True)
             button.can_focus = False
             yield button
-        yield LiteralText(id="said")
+        yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -186,14 +186,14 @@ class FormScreen(SpokenScreen[FormReply]):
         counts = {"title": entry.form.title, "open": open_ones, "all": len(entry.given)}
         top = self.words.fill("form_open" if open_ones else "form_complete", counts)
         self.query_one("#top", LiteralText).update(top)
-        self.query_one("#said", LiteralText).update(_said(entry, not open_ones, self.words))
+        self.query_one("#message", LiteralText).update(_message(entry, not open_ones, self.words))
         alive = [self.check_action("press", key[:2]) for key in KEYS]
         if alive != self._alive:
             self._alive = alive
             self.refresh_bindings()
 
 
-def _said(entry: FormEntry, all_answered: bool, words: Words) -> str:
+def _message(entry: FormEntry, all_answered: bool, words: Words) -> str:
     if entry.open:
         left, field = len(entry.open) - 1, entry.form.fields[entry.open[0]]
         asked = _quote(field.label, words) if field.limits is None else limits_words(field.limits, words)

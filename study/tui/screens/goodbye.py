@@ -9,13 +9,15 @@ from textual.widgets import Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Goodbye
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import refusal_words
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 
-class GoodbyeScreen(SpokenScreen[None]):
+class GoodbyeScreen(TranslatedScreen[None]):
+    """Thanks the participant and says what was saved."""
+
     PAGE = "help_goodbye"
     DEFAULT_CSS = "GoodbyeScreen { align: center middle; }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "close_page", "Close", key_display="Enter")]

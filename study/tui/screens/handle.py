@@ -9,13 +9,13 @@ from textual.widgets import Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import HandleView, Unanswered
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.handle_target import HandleTarget
 from study.tui.widgets.literal_text import LiteralText
 
 
-class HandleScreen(SpokenScreen[Unanswered | None]):
+class HandleScreen(TranslatedScreen[Unanswered | None]):
     """The application closes it when the handle is there."""
 
     PAGE = "help_handle"

@@ -10,10 +10,12 @@ from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 
 
-class HelpScreen(SpokenScreen[None], ModalScreen[None]):
+class HelpScreen(TranslatedScreen[None], ModalScreen[None]):
+    """Shows a page of help; Esc returns to the screen below."""
+
     CSS = """
     HelpScreen { align: center middle; }
     HelpScreen VerticalScroll {

@@ -14,7 +14,7 @@ from study.tui.home_messages import HomeWanted
 from study.tui.screens.browse import BrowseScreen
 from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.sensor import SensorScreen
-from study.tui.standing_words import describe
+from study.tui.session_status import describe
 from study.tui.widgets.new_session_form import NewSessionForm
 from study.tui.widgets.session_table import SessionTable
 
@@ -84,6 +84,8 @@ In a terminal: `hapteq study --subject P01`, `hapteq sessions`, `hapteq show SES
 
 
 class HomeScreen(Screen[None]):
+    """New-session form and list of past sessions; their actions are posted as messages."""
+
     HELP = HELP
     CSS = """
     HomeScreen #name { height: 1; padding: 0 1; background: $primary-muted; color: $foreground; }

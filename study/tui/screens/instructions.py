@@ -1,4 +1,4 @@
-"""What a participant reads before the first trial."""
+"""Instructions to the participant before the first trial."""
 
 from typing import ClassVar
 
@@ -11,14 +11,16 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Welcome
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import plan
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
 
-class InstructionsScreen(SpokenScreen[None]):
+class InstructionsScreen(TranslatedScreen[None]):
+    """Instructions before the first trial; dismissed when the participant begins."""
+
     PAGE = "help_instructions"
     DEFAULT_CSS = """
     InstructionsScreen { align: center top; }

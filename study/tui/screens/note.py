@@ -12,24 +12,25 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.watching.requests import NoteAsked, Who
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.help import HelpScreen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.literal_text import LiteralText
 
 MOST_CHARACTERS = 500
+"""Longest note: a few sentences, so that a line of the log stays readable."""
 WRITERS: tuple[Who, ...] = ("participant", "experimenter")
 
 
-class NoteScreen(SpokenScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
-    """Returns None if nothing is to be written."""
+class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
+    """A text, its writer, and whether it reports an adverse event. Dismissed with None if nothing is to be written."""
 
     PAGE = "help_note"
     DEFAULT_CSS = """
     NoteScreen { align: center middle; }
     NoteScreen TextArea { height: 5; margin: 1 0; }
     NoteScreen Button { margin-top: 1; }
-    NoteScreen #said { height: 1; color: $text-warning; }
+    NoteScreen #message { height: 1; color: $text-warning; }
     """
     AUTO_FOCUS = "TextArea"
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -54,7 +55,7 @@ class NoteScreen(SpokenScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
             yield LiteralText(words["note_adverse"])
             yield ChoiceRow((words["no"], words["yes"]), int(self._adverse), id="adverse")
             yield Button(words["note_button"], variant="primary", compact=True)
-            yield LiteralText(id="said")
+            yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
 
     @on(ChoiceRow.Left)
@@ -81,4 +82,4 @@ class NoteScreen(SpokenScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
         self.app.push_screen(HelpScreen(self.HELP, self.words))
 
     def _refuse(self, sentence: str) -> None:
-        self.query_one("#said", LiteralText).update(sentence)
+        self.query_one("#message", LiteralText).update(sentence)

@@ -12,6 +12,7 @@ from textual.widgets import Input, Label
 from study.tui.dismiss_screen import dismiss_screen
 
 MOST_CHARACTERS = 500
+"""Longest note, as on the note's own screen."""
 
 
 class NotePrompt(ModalScreen[str | None]):

@@ -14,7 +14,7 @@ from textual.widgets import Footer, Static
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 
 Decision = Literal["resume", "look", "home", "quit", "back"]
 
@@ -38,6 +38,8 @@ KEYS: dict[Decision, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
+    """Content of the panel: a title, paragraphs, and the possible next steps."""
+
     title: str
     parts: tuple[tuple[str, str], ...]
     """(heading, text); a heading may be empty."""
@@ -49,7 +51,9 @@ class Outcome:
     """In which a participant is told what to do."""
 
 
-class OutcomeScreen(SpokenScreen[Decision], ModalScreen[Decision]):
+class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
+    """The panel; dismissed with the next step that was chosen."""
+
     HELP = HELP
     CSS = """
     OutcomeScreen { align: center middle; }
@@ -90,7 +94,7 @@ class OutcomeScreen(SpokenScreen[Decision], ModalScreen[Decision]):
             return
         self.set_class(not outcome.grave, "-good")
         self.query_one(Vertical).border_title = f"{'! ' if outcome.grave else ''}{outcome.title}"
-        self.query_one("#told", Static).update(_told(outcome))
+        self.query_one("#told", Static).update(_outcome_text(outcome))
         keys = [(key, self.words.key(words)) for key, words in map(KEYS.__getitem__, outcome.decisions)]
         self.query_one("#offered", Static).update("\n".join(f"{key.capitalize():5}  {words}" for key, words in keys))
         self.refresh_bindings()
@@ -108,6 +112,6 @@ class OutcomeScreen(SpokenScreen[Decision], ModalScreen[Decision]):
         dismiss_screen(self, decision)
 
 
-def _told(outcome: Outcome) -> Content:
+def _outcome_text(outcome: Outcome) -> Content:
     parts = [Content.assemble((heading, "bold"), "\n" if heading else "", text) for heading, text in outcome.parts]
     return Content("\n\n").join(parts)

@@ -16,7 +16,7 @@ from study.session.watching.requests import NoteAsked
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.note import NoteScreen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
@@ -27,7 +27,7 @@ CHOICES = {
 }
 
 
-class PauseScreen(SpokenScreen[AfterPause]):
+class PauseScreen(TranslatedScreen[AfterPause]):
     """leaving: the participant asked to leave, so that choice is highlighted."""
 
     PAGE = "help_pause"
@@ -36,7 +36,7 @@ class PauseScreen(SpokenScreen[AfterPause]):
     PauseScreen OptionList, PauseScreen OptionList:focus {
         height: auto; border: none; padding: 0; margin-top: 1; background: transparent;
     }
-    PauseScreen #said { height: 1; margin-top: 1; text-style: bold; }
+    PauseScreen #message { height: 1; margin-top: 1; text-style: bold; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("n", "note(False)", "Note"),
@@ -60,7 +60,7 @@ class PauseScreen(SpokenScreen[AfterPause]):
             yield LiteralText(words.fill("pause_reason", {"reason": words.fact(self._notice.reason)}), classes="gap")
             yield LiteralText(words.counted("saved", self._notice.answers))
             yield OptionList(*(Option(words[key], id=choice.value) for choice, key in CHOICES.items()), markup=False)
-            yield LiteralText(id="said")
+            yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -85,11 +85,11 @@ class PauseScreen(SpokenScreen[AfterPause]):
         if confirmed:
             dismiss_screen(self, AfterPause.WITHDRAW)
         else:
-            self.query_one("#said", LiteralText).update(self.words["nothing_erased"])
+            self.query_one("#message", LiteralText).update(self.words["nothing_erased"])
 
     def _take_note(self, note: NoteAsked | None) -> None:
         if note is None:
-            self.query_one("#said", LiteralText).update(self.words["nothing_written"])
+            self.query_one("#message", LiteralText).update(self.words["nothing_written"])
             return
         self.post_message(self.NoteWritten(note))
-        self.query_one("#said", LiteralText).update(self.words["goes_into_log"])
+        self.query_one("#message", LiteralText).update(self.words["goes_into_log"])

@@ -10,20 +10,20 @@ from textual.widgets import Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import PlayingNotice, Unanswered
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_replies import LEAVING, PAUSE
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
 
-class PlayingScreen(SpokenScreen[Unanswered | None]):
+class PlayingScreen(TranslatedScreen[Unanswered | None]):
     """The application closes it when the time is over."""
 
     PAGE = "help_playing"
     DEFAULT_CSS = """
     PlayingScreen #title { height: 1; margin: 2 1 0 1; text-align: center; text-style: bold; }
     PlayingScreen #answers { height: 1fr; margin: 0 1; }
-    PlayingScreen #said { height: 3; margin: 0 1; text-align: center; }
+    PlayingScreen #message { height: 3; margin: 0 1; text-align: center; }
     """
     AUTO_FOCUS = ""
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -39,7 +39,7 @@ class PlayingScreen(SpokenScreen[Unanswered | None]):
         notice, words = self._notice, self.words
         yield LiteralText(words.fact(notice.title), id="title")
         if notice.title and not notice.number:  # a probe: nothing will be asked about it
-            yield LiteralText(words["playing_no_key"], id="said")
+            yield LiteralText(words["playing_no_key"], id="message")
             yield Footer(show_command_palette=False)
             return
         with Horizontal(id="answers"):
@@ -48,7 +48,7 @@ class PlayingScreen(SpokenScreen[Unanswered | None]):
                 # Between two intervals there is nothing to feel, and no title.
                 panel.mark = "now" if notice.title and number == notice.number else ""
                 yield panel
-        yield LiteralText(words["playing_only_feel" if notice.title else "playing_gap"], id="said")
+        yield LiteralText(words["playing_only_feel" if notice.title else "playing_gap"], id="message")
         yield Footer(show_command_palette=False)
 
     def action_pause(self) -> None:

@@ -9,12 +9,14 @@ from textual.widgets import Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import PracticeResult
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 
-class PracticeOverScreen(SpokenScreen[None]):
+class PracticeOverScreen(TranslatedScreen[None]):
+    """Shows the result of a practice until a key is pressed."""
+
     PAGE = "help_practice"
     DEFAULT_CSS = "PracticeOverScreen { align: center middle; }"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "go_on", "Go on", key_display="Enter")]

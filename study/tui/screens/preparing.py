@@ -8,13 +8,14 @@ from textual.containers import Vertical
 from textual.widgets import Footer, Static
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 
 TICK_S = 0.5
+"""Interval at which the elapsed time is drawn (s)."""
 SILENT = "…"
 
 
-class PreparingScreen(SpokenScreen[None]):
+class PreparingScreen(TranslatedScreen[None]):
     """Without a sentence it says nothing: until the protocol was read, the participant's language is not known."""
 
     PAGE = "help_preparing"

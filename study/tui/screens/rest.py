@@ -11,15 +11,16 @@ from textual.widgets import Digits, Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import RestNotice
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import progress_sentence
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
 TICK_S = 0.2
+"""Interval at which the remaining time is drawn (s)."""
 
 
-class RestScreen(SpokenScreen[float]):
+class RestScreen(TranslatedScreen[float]):
     """Returns the seconds rested, never fewer than requested."""
 
     PAGE = "help_rest"
@@ -40,7 +41,7 @@ class RestScreen(SpokenScreen[float]):
         with Card(words["rest_title"]):
             yield LiteralText(words["rest_relax"], classes="strong")
             yield Digits()
-            yield LiteralText(id="said", classes="gap strong")
+            yield LiteralText(id="message", classes="gap strong")
             yield LiteralText(words.counted("runs_left", notice.runs_left), classes="gap")
             if notice.progress is not None:
                 yield LiteralText(progress_sentence(notice.progress, words))
@@ -53,22 +54,22 @@ class RestScreen(SpokenScreen[float]):
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         # Until the rest is over Enter does nothing, so the footer does not name it.
-        return action != "go_on" or self._over()
+        return action != "go_on" or self._is_over()
 
     def action_go_on(self) -> None:
-        if self._over():
+        if self._is_over():
             dismiss_screen(self, self._seconds_rested())
 
     def _tick(self) -> None:
         left_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))
         self.query_one(Digits).update(f"{left_s // 60}:{left_s % 60:02d}")
-        self.query_one("#said", LiteralText).update(self.words["rest_ready" if self._over() else "rest_resting"])
-        if self._over():
+        self.query_one("#message", LiteralText).update(self.words["rest_ready" if self._is_over() else "rest_resting"])
+        if self._is_over():
             self._ticking.stop()
             self.refresh_bindings()
 
     def _seconds_rested(self) -> float:
         return time.monotonic() - self._began_s
 
-    def _over(self) -> bool:
+    def _is_over(self) -> bool:
         return self._seconds_rested() >= self._notice.seconds

@@ -31,10 +31,14 @@ In a terminal: `hapteq doctor --calibrate-sensor PORT --keep`.
 """
 FIELDS = (("port", "Port", "/dev/ttyACM0"), ("baud", "Baud", "2000000"))
 BAUD = 2_000_000
+"""Default rate of the serial line."""
 STEPS = 6
+"""Positions of the calibration."""
 
 
 class SensorScreen(Screen[None]):
+    """Guides through the six positions of the calibration; the engine reads the sensor."""
+
     HELP = HELP
     CSS = """
     SensorScreen { align: center middle; }
@@ -79,19 +83,19 @@ class SensorScreen(Screen[None]):
                 self._waits_for = message
                 if heard is not None:
                     self._note(f"✓ read {', '.join(f'{value:.0f}' for value in heard)}")
-                self._say(f"{number} of {STEPS}: lay the sensor down with {position}, let go of it, press Enter.")
+                self._show_line(f"{number} of {STEPS}: lay the sensor down with {position}, let go of it, press Enter.")
             case Calibrated(table=table, file=file):
                 self._under_way, self._table = False, table
                 self.query_one("#seen", Static).update(table)
-                self._say(f"Enter writes this into {file}; Esc leaves it.")
+                self._show_line(f"Enter writes this into {file}; Esc leaves it.")
             case SensorKept(file=file):
                 self._lock(False)
-                self._say(f"Written into {file}. `hapteq doctor` checks the sensor. Esc goes back.")
+                self._show_line(f"Written into {file}. `hapteq doctor` checks the sensor. Esc goes back.")
 
     def begin_again(self) -> None:
         """After an error, which a panel above says."""
         self._waits_for, self._under_way, self._table = None, False, ""
-        self._say("F5 begins again.")
+        self._show_line("F5 begins again.")
         self.query_one("#seen", Static).update("")
         self._lock(False)
 
@@ -108,7 +112,7 @@ class SensorScreen(Screen[None]):
             self._under_way, self._table = True, ""
             self.query_one("#seen", Static).update("")
             self._lock(True)
-            self._say("The port is opened…")
+            self._show_line("The port is opened…")
             self.post_message(CalibrateWanted(port, int(baud)))
 
     def action_go_on(self) -> None:
@@ -119,7 +123,7 @@ class SensorScreen(Screen[None]):
         elif self._table:
             self.post_message(KeepWanted(self._table))
             self._table = ""
-            self._say("It is written…")
+            self._show_line("It is written…")
         elif isinstance(self.focused, Input):
             self.action_begin()
 
@@ -131,17 +135,17 @@ class SensorScreen(Screen[None]):
     @on(Input.Changed)
     def _unsay(self) -> None:
         if not self._under_way:
-            self._say("F5 begins.")
+            self._show_line("F5 begins.")
 
     def _lock(self, locked: bool) -> None:
         for field in self.query(Input):
             field.disabled = locked
 
     def _refuse(self, text: str, field: str) -> None:
-        self._say(text)
+        self._show_line(text)
         self.query_one(f"#{field}", Input).focus()
 
-    def _say(self, text: str) -> None:
+    def _show_line(self, text: str) -> None:
         self.query_one("#do", Static).update(text)
 
     def _note(self, text: str) -> None:

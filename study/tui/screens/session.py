@@ -17,7 +17,7 @@ from study.tui.drawing.staircase_drawing import LEGEND
 from study.tui.home_messages import AnalyzeWanted, HomeWanted, ResumeWanted, WatchWanted, WithdrawWanted
 from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.withdraw_prompt import WithdrawPrompt
-from study.tui.standing_words import STYLES, describe, standing_words
+from study.tui.session_status import STYLES, describe, status_text
 from study.tui.widgets.long_text import LongText
 from study.tui.widgets.staircase_plot import StaircasePlot
 from study.tui.widgets.text_table import TextTable
@@ -45,6 +45,8 @@ In a terminal: `hapteq show SESSION`, `hapteq resume SESSION`, `hapteq analyze S
 
 
 class SessionScreen(Screen[None]):
+    """One past session in tabs, with its actions: resume, analyse, withdraw, watch."""
+
     HELP = HELP
     CSS = """
     SessionScreen #head { height: 1; padding: 0 1; background: $primary-muted; }
@@ -185,7 +187,7 @@ def _head(view: SessionView) -> Content:
     parts: list[Content | str | tuple[str, str]] = [
         (line.name, "bold"),
         "   ",
-        (standing_words(line.standing), STYLES[line.standing]),
+        (status_text(line.standing), STYLES[line.standing]),
         f"   {line.protocol}",
     ]
     return Content.assemble(*parts)

@@ -16,7 +16,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Answered, Question, Reply, Task, Unanswered
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.keys.key_presses import KeyPresses, arrival_s
-from study.tui.spoken_screen import SpokenScreen
+from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER, repeat_words
 from study.tui.trial_words import heading, run_key
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
@@ -36,7 +36,7 @@ NUM_LOCK = {"end", "down", "kp_begin"}
 """Keys that a number pad's 1 and 2 send while Num Lock is off."""
 
 
-class TrialScreen(SpokenScreen[None]):
+class TrialScreen(TranslatedScreen[None]):
     """One per sitting: armed for each question, inactive in between."""
 
     PAGE = "help_trial"
@@ -44,7 +44,7 @@ class TrialScreen(SpokenScreen[None]):
     TrialScreen { layout: vertical; }
     TrialScreen #asked { height: 1; margin: 1 1 0 1; text-align: center; text-style: bold; }
     TrialScreen #answers { height: 1fr; margin: 0 1; }
-    TrialScreen #said { height: 1; margin: 0 1; text-align: center; text-style: bold; }
+    TrialScreen #message { height: 1; margin: 0 1; text-align: center; text-style: bold; }
     TrialScreen #trouble { height: 2; margin: 0 1; text-align: center; color: $text-warning; }
     """
     AUTO_FOCUS = ""
@@ -83,7 +83,7 @@ class TrialScreen(SpokenScreen[None]):
         with Horizontal(id="answers"):
             yield DirectionPanel(1, words=self.words)
             yield DirectionPanel(2, words=self.words)
-        yield LiteralText(id="said")
+        yield LiteralText(id="message")
         yield LiteralText(id="trouble")
         yield Footer(show_command_palette=False)
 
@@ -114,19 +114,19 @@ class TrialScreen(SpokenScreen[None]):
         self._armed_s = None
         self._drop_limit()
         if not self._taken:
-            self._say(self.words["wait"])
+            self._show_message(self.words["wait"])
 
     def show_saved(self) -> None:
         """Show that the answer is on the disk."""
         if self._taken:
-            self._mark("saved")
+            self._show_mark("saved")
             saved = f"{self.words.fill('answer_saved', {'answer': self._taken})} {self.words['wait']}"
-            self._say(self._verdict_sentence() or saved)
+            self._show_message(self._verdict_sentence() or saved)
 
     def show_feedback(self, correct: bool) -> None:
         """Shown now, and with the next question."""
         self._verdict = correct
-        self._say(self._verdict_sentence())
+        self._show_message(self._verdict_sentence())
 
     def show_trouble(self, sentence: str) -> None:
         """Shown until the next trial is over, so that there is time to read it."""
@@ -147,17 +147,17 @@ class TrialScreen(SpokenScreen[None]):
     def on_paste(self, event: Paste) -> None:
         event.stop()
         if self._armed_s is not None:
-            self._say(f"{self.words['pasted']} {self._press()}")
+            self._show_message(f"{self.words['pasted']} {self._press()}")
 
     def action_reply(self, name: str) -> None:
         reply = REPLIES[name]
         if self._armed_s is not None and reply is REPEAT and self._repeats_left == 0:
-            self._say(f"{self.words['no_repeats']} {self._press()}")
+            self._show_message(f"{self.words['no_repeats']} {self._press()}")
         elif self._armed_s is not None:
             self._reply(reply)
         elif reply.pause:
             self._wanted = reply, time.monotonic()
-            self._say(self.words["pause_comes"])
+            self._show_message(self.words["pause_comes"])
 
     def action_heard(self, answer: int) -> None:
         """Gives the footer its entry; the answers are handled in `on_key`."""
@@ -168,20 +168,20 @@ class TrialScreen(SpokenScreen[None]):
         if armed_s is None or at_s < armed_s:
             return
         if not is_press:
-            self._say(f"{self.words['key_held']} {self._press()}")
+            self._show_message(f"{self.words['key_held']} {self._press()}")
             return
         self._armed_s = None
         self.post_message(self.Replied(Answered(answer, at_s)))
         self._drop_limit()
         self._taken = answer
-        self._mark("taken")
-        self._say(self.words.fill("answer_taken", {"answer": answer}))
+        self._show_mark("taken")
+        self._show_message(self.words.fill("answer_taken", {"answer": answer}))
 
     def _reply(self, reply: Unanswered) -> None:
         self._armed_s = None
         self.post_message(self.Replied(reply))
         self._drop_limit()
-        self._say(self.words[AFTER[reply]] if reply in AFTER else repeat_words(self._repeats_left, self.words))
+        self._show_message(self.words[AFTER[reply]] if reply in AFTER else repeat_words(self._repeats_left, self.words))
 
     def _time_over(self) -> None:
         if self._armed_s is not None:
@@ -194,11 +194,11 @@ class TrialScreen(SpokenScreen[None]):
 
     def _refuse(self, event: Key) -> None:
         if event.key in NUM_LOCK:
-            self._say(self.words["num_lock"])
+            self._show_message(self.words["num_lock"])
         elif event.is_printable or event.key == "enter":
             key = {"enter": "enter_key", "space": "space_key"}.get(event.key)
             typed = f"'{event.character}'" if key is None else self.words[key]
-            self._say(f"{self.words.fill('no_answer', {'typed': typed})} {self._press()}")
+            self._show_message(f"{self.words.fill('no_answer', {'typed': typed})} {self._press()}")
 
     def _verdict_sentence(self) -> str:
         return "" if self._verdict is None else self.words["right" if self._verdict else "wrong"]
@@ -210,7 +210,7 @@ class TrialScreen(SpokenScreen[None]):
         self.query_one("#trouble", LiteralText).update(self._trouble)
         question = self._question
         if question is None:
-            self._say(self.words["wait"])
+            self._show_message(self.words["wait"])
             return
         bar = self.query_one(SessionBar)
         bar.heading, bar.progress = heading(question, self.words), question.progress
@@ -218,20 +218,20 @@ class TrialScreen(SpokenScreen[None]):
         for panel in self.query(DirectionPanel):
             panel.picture = question.picture if question.task is Task.DIRECTION else None
             panel.mark = ""
-        self._say(f"{last}{self._press()} {self.words['guess']}")
+        self._show_message(f"{last}{self._press()} {self.words['guess']}")
 
     @property
     def _composed(self) -> bool:
         """Whether it has been drawn; it may be armed before its first frame."""
-        return bool(self.query("#said"))
+        return bool(self.query("#message"))
 
-    def _mark(self, mark: Mark) -> None:
+    def _show_mark(self, mark: Mark) -> None:
         for panel in self.query(DirectionPanel):
             panel.mark = mark if panel.number == self._taken else ""
 
     def _press(self) -> str:
         return self.words.fill("press", {"keys": self._keys.choice(self.words)})
 
-    def _say(self, sentence: str) -> None:
+    def _show_message(self, sentence: str) -> None:
         if self._composed:
-            self.query_one("#said", LiteralText).update(sentence)
+            self.query_one("#message", LiteralText).update(sentence)

@@ -35,7 +35,7 @@ class WithdrawPrompt(ModalScreen[bool]):
         width: 70; max-width: 95%; height: auto; border: round $error; padding: 1 2; background: $surface;
     }
     WithdrawPrompt Input { margin-top: 1; }
-    WithdrawPrompt #said { height: 1; color: $text-error; }
+    WithdrawPrompt #message { height: 1; color: $text-error; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Keep everything", key_display="Esc"),
@@ -56,7 +56,7 @@ class WithdrawPrompt(ModalScreen[bool]):
                 markup=False,
             )
             yield Input(compact=True, id="code")
-            yield Static("", id="said", markup=False)
+            yield Static("", id="message", markup=False)
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
@@ -64,7 +64,7 @@ class WithdrawPrompt(ModalScreen[bool]):
         if typed.value.strip() == self._subject:
             dismiss_screen(self, True)
         else:
-            self.query_one("#said", Static).update(f"That is not {self._subject}. Nothing was erased.")
+            self.query_one("#message", Static).update(f"That is not {self._subject}. Nothing was erased.")
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(HELP))

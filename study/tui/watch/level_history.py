@@ -49,7 +49,7 @@ class LevelHistory(Widget):
 def level_history(
     points: Sequence[StaircasePoint], next_n: float | None, cap_n: float, size: tuple[int, int]
 ) -> Content:
-    """size: columns and rows, labels and legend included."""
+    """The staircase with its marks, levels and legend as lines. size: columns and rows, labels and legend included."""
     columns, rows = size[0] - LABEL_COLUMNS, size[1] - 1
     levels = [point.level_n for point in points] + ([next_n] if next_n is not None else [])
     lowest_n = min([cap_n / LEAST_RANGE, *(0.85 * level for level in levels)])
@@ -65,7 +65,7 @@ def level_history(
     for start, end in itertools.pairwise(dots):
         canvas.line(start, end)
     marks: dict[tuple[int, int], str] = {}
-    for (x, y), mark in zip(dots, [*map(_mark, points), NEXT], strict=False):
+    for (x, y), mark in zip(dots, [*map(_point_mark, points), NEXT], strict=False):
         cell = (round(y) // 4, round(x) // 2)
         if cell not in marks or _FIRST[mark] >= _FIRST[marks[cell]]:
             marks[cell] = mark
@@ -77,7 +77,7 @@ def level_history(
     return Content("\n").join([*lines, legend])
 
 
-def _mark(point: StaircasePoint) -> str:
+def _point_mark(point: StaircasePoint) -> str:
     """A reversal after a right answer is a peak, after a wrong one a valley."""
     if point.reversal:
         return PEAK if point.correct else VALLEY

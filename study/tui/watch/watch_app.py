@@ -20,6 +20,8 @@ from study.tui.watch.watch_source import WatchSource
 
 
 class WatchApp(App[None]):
+    """The experimenter's view in a terminal of its own."""
+
     TITLE = "hapteq watch"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("t", "next_theme", "Theme", show=False)]
 

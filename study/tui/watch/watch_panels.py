@@ -40,9 +40,11 @@ _STANDING_STYLES = {
 _RUN_SYMBOLS: dict[RunStatus, str] = {"done": "✓", "present": "▶", "to come": " "}
 _VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error"}
 BAR_CELLS = 6
+"""Characters of a bar."""
 
 
 def standing_line(view: WatchView) -> Content:
+    """Status of the session, its name, and what happens at the moment."""
     standing = f"{SYMBOLS[view.standing]} {view.standing.upper()}"
     return Content.assemble(
         (standing, _STANDING_STYLES[view.standing]), "  ", (view.session, "bold"), f"  {describe_activity(view)}"
@@ -50,6 +52,7 @@ def standing_line(view: WatchView) -> Content:
 
 
 def alarm_lines(unseen: Sequence[Alarm], seen: Sequence[Alarm]) -> Content:
+    """Alarms with their times: new ones first, acknowledged ones below."""
     loud = [
         Content.assemble((f"▲ {alarm.sentence}", "bold $text-error"), (f"  since {clock_time(alarm.since)}", ""))
         for alarm in unseen
@@ -66,6 +69,7 @@ def runs_lines(view: WatchView, rows: int) -> Content:
 
 
 def trials_lines(view: WatchView, rows: int, columns: int) -> Content:
+    """A table of the latest trials; the open one without its direction."""
     header = "trial     N shown said           s m/s²  off"
     lines = [Content.styled(f"{header}  remark" if columns > len(header) + 10 else header, MUTED)]
     trial = view.open_trial
@@ -97,6 +101,7 @@ def gauges(view: WatchView) -> Content:
 
 
 def details(view: WatchView) -> Content:
+    """Participant, forms, practice, drift and notes as text."""
     who = f"simulated '{view.observer}'" if view.observer else "a person"
     answers = "1 answer" if view.answers == 1 else f"{view.answers} answers"
     parts: list[Piece] = [

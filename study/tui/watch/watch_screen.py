@@ -84,7 +84,9 @@ LOOK_EVERY_S = 0.1
 UNHEARD_AFTER_S = 2.0
 """A session checks for requests twenty times a second."""
 NO_NEWS_AFTER_S = 3.0
+"""Time without a new view (s) after which the screen says that it is old."""
 SAID_FOR_S = 8.0
+"""Time for which a message stays (s)."""
 
 
 class WatchMessage(Message):
@@ -96,6 +98,8 @@ class WatchMessage(Message):
 
 
 class WatchScreen(Screen[None]):
+    """The view, redrawn whenever a new one arrives, and the keys that send requests to the session."""
+
     HELP = HELP
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (126, "-wide")]  # noqa: RUF012 - as in the base class
     CSS = STYLE
@@ -160,7 +164,7 @@ class WatchScreen(Screen[None]):
             self._taken = view
             self.post_message(WatchMessage(view))
         elif self.is_mounted:
-            self._attend()
+            self._redraw()
 
     def on_watch_message(self, message: WatchMessage) -> None:
         self._news_s = self._clock_s()
@@ -170,7 +174,7 @@ class WatchScreen(Screen[None]):
     def watch_view(self, view: WatchView | None) -> None:
         if view is None:
             return
-        self._attend()
+        self._redraw()
         self.query_one("#standing", Static).update(standing_line(view))
         self.query_one("#levels").border_title = staircase_title(view)
         self.query_one(LevelHistory).show(view.points, view.next_level_n, view.cap_n)
@@ -189,7 +193,7 @@ class WatchScreen(Screen[None]):
         runs.update(runs_lines(self.view, runs.content_size.height))
         trials.update(trials_lines(self.view, trials.content_size.height, trials.content_size.width))
 
-    def _attend(self) -> None:
+    def _redraw(self) -> None:
         now_s = self._clock_s()
         alarms = (*self._own_alarms(now_s), *self._alarms_of_the_view())
         if self._book.take(alarms, now_s):
@@ -209,7 +213,7 @@ class WatchScreen(Screen[None]):
         alarms = []
         if self._stop_sent_s is not None and self.view is not None and self.view.standing not in ON:
             self._stop_sent_s, self._stopped_here = None, True
-            self._say(f"The session has stopped: {self.view.reason}.")
+            self._show_message(f"The session has stopped: {self.view.reason}.")
         if self._stop_sent_s is not None and now_s - self._stop_sent_s > UNHEARD_AFTER_S:
             unheard = "The session has not answered the stop. Hand off the handle; switch the device off."
             alarms.append(Alarm("stop unheard", unheard, since))
@@ -229,24 +233,26 @@ class WatchScreen(Screen[None]):
 
     def action_stop(self) -> None:
         self._stop_sent_s = self._clock_s()
-        self._send(StopAsked("experimenter"), "Stop sent: the force goes off at once.")
+        self._send_request(StopAsked("experimenter"), "Stop sent: the force goes off at once.")
 
     def action_pause(self) -> None:
         if self.view is not None and self.view.standing == "paused":
-            self._say("It is paused already; the participant goes on at their own screen.")
+            self._show_message("It is paused already; the participant goes on at their own screen.")
             return
-        self._send(PauseAsked("experimenter"), "Pause sent. The participant goes on at their own screen.")
+        self._send_request(PauseAsked("experimenter"), "Pause sent. The participant goes on at their own screen.")
 
     def action_note(self, adverse: bool) -> None:
         def write(text: str | None) -> None:
             if text:
-                self._send(NoteAsked("experimenter", text, adverse), "Sent: the session writes it into the log.")
+                self._send_request(
+                    NoteAsked("experimenter", text, adverse), "Sent: the session writes it into the log."
+                )
 
         self.app.push_screen(NotePrompt(adverse, self.action_stop), write)
 
     def action_acknowledge(self) -> None:
         seen = self._book.acknowledge(self._clock_s())
-        self._say(f"{seen} alarm{'' if seen == 1 else 's'} seen." if seen else "There is no alarm to be seen.")
+        self._show_message(f"{seen} alarm{'' if seen == 1 else 's'} seen." if seen else "There is no alarm to be seen.")
         self._show_alarms()
 
     def action_details(self) -> None:
@@ -261,18 +267,18 @@ class WatchScreen(Screen[None]):
     def action_leave(self) -> None:
         self.post_message(self.Left())
 
-    def _send(self, request: Request, text: str) -> None:
+    def _send_request(self, request: Request, text: str) -> None:
         try:
             self._ask(request)
         except StudyError as error:
-            self._say(f"NOT sent: {error.happened} {error.do_now}")
+            self._show_message(f"NOT sent: {error.happened} {error.do_now}")
             self.app.bell()
             return
         if self.view is not None and self.view.standing not in ON:
             text = "Nothing runs here; it was sent all the same."
-        self._say(text)
+        self._show_message(text)
 
-    def _say(self, sentence: str) -> None:
+    def _show_message(self, sentence: str) -> None:
         self._said_s = self._clock_s()
         self._guide(sentence, reply=True)
 

@@ -58,10 +58,12 @@ def run_name(view: WatchView, run: WatchedRun) -> str:
 
 
 def reversals(run: WatchedRun) -> str:
+    """Reversals of a run so far, of those that end it."""
     return f"{run.reversals}/{run.reversals_needed}" if run.reversals_needed else "–"
 
 
 def staircase_title(view: WatchView) -> str:
+    """Title of the drawn staircase: run, frequency, reversals, next level."""
     shown = next((run for run in view.runs if run.run == view.shown_run), None)
     if shown is None:
         return "Staircase: nothing answered yet"
@@ -87,19 +89,23 @@ def not_measured(trial: ClosedTrial) -> bool:
 
 
 def time_words(exposure: Exposure) -> str:
+    """Elapsed time of its limit."""
     return f"{exposure.elapsed_min:.0f} of {exposure.limit_min:g} min"
 
 
 def dose_words(exposure: Exposure) -> str:
+    """Vibration dose A(8) of its limit."""
     return f"{exposure.dose_a8_mps2:.2f} of {exposure.dose_limit_mps2:g} m/s²"
 
 
 def catch_words(view: WatchView) -> str:
+    """Lapses among the catch trials given."""
     lapses = f"{view.catch_lapses} {'lapse' if view.catch_lapses == 1 else 'lapses'}"
     return f"{lapses} in {view.catch_given}" if view.catch_given else "none so far"
 
 
 def handle_words(view: WatchView) -> str:
+    """Distance of the handle from its place."""
     live = view.live
     if live is None or live.offset_mm is None:
         return "not read now"
@@ -110,6 +116,7 @@ def handle_words(view: WatchView) -> str:
 
 
 def sensor_words(view: WatchView) -> str:
+    """Reading of the accelerometer."""
     live = view.live
     if live is None or live.acceleration_mps2 is None:
         return "not read now"
@@ -118,6 +125,7 @@ def sensor_words(view: WatchView) -> str:
 
 
 def device_words(view: WatchView) -> str:
+    """Fault and late ticks of the device."""
     if view.live is None:
         return "not read now"
     if view.live.fault:

@@ -21,6 +21,8 @@ class Card(Vertical):
 
 
 class Sheet(VerticalScroll):
+    """Text that scrolls, for more than a screenful."""
+
     DEFAULT_CSS = """
     Sheet {
         width: 100%; max-width: 100; height: 1fr; padding: 0 2;

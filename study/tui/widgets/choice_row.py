@@ -14,6 +14,7 @@ from textual.widget import Widget
 from study.session.views.form_entry import find_choice, move_mark
 
 GAP = 3
+"""Characters between two choices in a row."""
 
 
 class ChoiceRow(Widget, can_focus=True):

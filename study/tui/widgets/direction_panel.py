@@ -43,14 +43,14 @@ class DirectionPanel(Widget):
 
     def __init__(self, number: int, picture: DirectionPicture | None = None, words: Words = ENGLISH_WORDS) -> None:
         super().__init__()
-        self._spoken = words
+        self._texts = words
         self.number = number
         self.set_reactive(DirectionPanel.picture, picture)
 
     def watch_mark(self, before: Mark, after: Mark) -> None:
         self.remove_class(f"-{before}")
         self.set_class(bool(after), f"-{after}")
-        self.border_subtitle = f"{self.number} {self._spoken[f'mark_{after}']}" if after else ""
+        self.border_subtitle = f"{self.number} {self._texts[f'mark_{after}']}" if after else ""
 
     def render_line(self, y: int) -> Strip:
         width, height = self.size
@@ -80,12 +80,12 @@ class DirectionPanel(Widget):
 
     def _lines(self) -> list[str]:
         """The words in as many lines as they need, for a cut word may be the one that tells the directions apart."""
-        return textwrap.wrap(self._words(), max(1, self.size.width), break_on_hyphens=False) or [""]
+        return textwrap.wrap(self._direction_text(), max(1, self.size.width), break_on_hyphens=False) or [""]
 
-    def _words(self) -> str:
+    def _direction_text(self) -> str:
         if self.picture is None:
-            return self._spoken["interval_first" if self.number == 1 else "interval_second"]
-        return sentence(self.picture, self.number, self._spoken)
+            return self._texts["interval_first" if self.number == 1 else "interval_second"]
+        return sentence(self.picture, self.number, self._texts)
 
 
 def _room(size: Size) -> Size:

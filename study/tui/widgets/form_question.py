@@ -14,6 +14,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class FormQuestion(Vertical):
+    """A question with its answer, or its choices."""
+
     DEFAULT_CSS = """
     FormQuestion {
         height: auto; margin-bottom: 1; padding: 0 1 0 2; background: $surface;
@@ -26,7 +28,7 @@ class FormQuestion(Vertical):
         super().__init__()
         self.field = field
         self._number = number
-        self._spoken = words
+        self._texts = words
 
     def compose(self) -> ComposeResult:
         yield LiteralText(f"{self._number}. {self.field.label}")
@@ -56,9 +58,9 @@ class FormQuestion(Vertical):
 
     def _answer_text(self, given: FieldEntry, at: bool) -> Text:
         if not given.answer:
-            hint = self._spoken["form_type" if self.field.needed else "form_type_or_not"]
+            hint = self._texts["form_type" if self.field.needed else "form_type_or_not"]
             if self.field.limits is not None:
-                hint = f"{hint} ({limits_words(self.field.limits, self._spoken)})"
+                hint = f"{hint} ({limits_words(self.field.limits, self._texts)})"
             text = Text(hint, "dim")
             if at:
                 text.stylize("reverse", 0, 1)

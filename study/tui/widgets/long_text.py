@@ -13,6 +13,8 @@ _LEAD = re.compile(r".{1,16}?\s{2,}")
 
 
 class LongText(ScrollView, can_focus=True):
+    """Lines of text, drawn as they scroll into view."""
+
     DEFAULT_CSS = "LongText { background: $background; }"
 
     def __init__(self, lines: tuple[str, ...], *, id: str | None = None) -> None:

@@ -18,6 +18,8 @@ NOTHING_YET = [("…", "")]
 
 
 class NewSessionForm(Vertical):
+    """Fields of a new session; posts the request to begin once they are valid."""
+
     DEFAULT_CSS = """
     NewSessionForm { height: auto; border: round $primary; padding: 0 1; }
     NewSessionForm:focus-within { border: round $accent; }
@@ -56,13 +58,13 @@ class NewSessionForm(Vertical):
     def show(self, home: HomeView) -> None:
         """Show the choices; earlier selections are kept if still available."""
         self._home = home
-        self._offer("#protocol", [(_protocol_prompt(p.name, p.locked), p.name) for p in home.protocols])
-        self._offer("#device", [(_device_prompt(name), name) for name in home.devices])
-        self._offer("#model", [(_model_prompt(path, home), path) for path in home.models])
+        self._set_options("#protocol", [(_protocol_prompt(p.name, p.locked), p.name) for p in home.protocols])
+        self._set_options("#device", [(_device_prompt(name), name) for name in home.devices])
+        self._set_options("#model", [(_model_prompt(path, home), path) for path in home.models])
         proposed = next_code(tuple(line.subject for line in home.sessions if line.observer is None))
         self.query_one("#code", Input).placeholder = f"code, such as {proposed}"
         self.query_one("#begin", Button).disabled = not (home.protocols and home.devices)
-        self._say()
+        self._show_problem()
 
     def action_begin(self) -> None:
         self._begin()
@@ -75,7 +77,7 @@ class NewSessionForm(Vertical):
         code = self._code
         problem = code_problem(code) or self._standing_problem(code)
         if problem or self._model_problem:
-            self._about(problem or self._model_problem, "-problem")
+            self._show_about(problem or self._model_problem, "-problem")
             self.query_one("#code" if problem else "#protocol").focus()
             return
         model = self._selected_value("#model") if self._equalized else ""
@@ -83,22 +85,22 @@ class NewSessionForm(Vertical):
 
     @on(Input.Changed, "#code")
     @on(Select.Changed)
-    def _say(self) -> None:
+    def _show_problem(self) -> None:
         if self._home is None:
             return
         code = self._code
         self.set_class(self._equalized, "-equalized")
         if code and not is_code(code):
-            self._about(code_problem(code), "-problem")
+            self._show_about(code_problem(code), "-problem")
         elif problem := self._standing_problem(code):
-            self._about(problem, "-problem")
+            self._show_about(problem, "-problem")
         elif self._model_problem:
-            self._about(self._model_problem, "-problem")
+            self._show_about(self._model_problem, "-problem")
         elif notice := self._notice(code):
-            self._about(notice, "-notice")
+            self._show_about(notice, "-notice")
         else:
             protocol = self._selected_value("#protocol")
-            self._about(next((p.title for p in self._home.protocols if p.name == protocol), ""), "")
+            self._show_about(next((p.title for p in self._home.protocols if p.name == protocol), ""), "")
 
     @property
     def _equalized(self) -> bool:
@@ -139,7 +141,7 @@ class NewSessionForm(Vertical):
         value = self.query_one(which, Select).value
         return value if isinstance(value, str) else ""
 
-    def _offer(self, which: str, options: list[tuple[str, str]]) -> None:
+    def _set_options(self, which: str, options: list[tuple[str, str]]) -> None:
         select: Select[str] = self.query_one(which, Select)
         before = select.value
         values = [value for _, value in options or NOTHING_YET]
@@ -147,7 +149,7 @@ class NewSessionForm(Vertical):
         select.disabled = not options
         select.value = before if before in values else values[0]
 
-    def _about(self, text: str, kind: str) -> None:
+    def _show_about(self, text: str, kind: str) -> None:
         about = self.query_one("#about", Static)
         about.set_class(kind == "-problem", "-problem")
         about.set_class(kind == "-notice", "-notice")

@@ -13,6 +13,8 @@ DONE, LEFT = "━", "─"
 
 
 class SessionBar(Widget):
+    """Run and trial on the left, progress on the right."""
+
     DEFAULT_CSS = """
     SessionBar { height: 1; padding: 0 1; background: $panel; color: $foreground; }
     """
@@ -27,14 +29,14 @@ class SessionBar(Widget):
     def render_line(self, y: int) -> Strip:
         width = self.size.width
         # The bar gives way to the words, which must not be cut off.
-        room = width - len(self.heading) - 1 - len(self._told(0))
-        right = self._told(max(8, min(40, width // 4, room)))
+        room = width - len(self.heading) - 1 - len(self._progress_text(0))
+        right = self._progress_text(max(8, min(40, width // 4, room)))
         left = self.heading[: max(0, width - len(right) - 1)]
         gap = " " * (width - len(left) - len(right))
         style = self.rich_style
         return Strip([Segment(left, style + Style(bold=True)), Segment(gap + right, style)], width).crop(0, width)
 
-    def _told(self, bar: int) -> str:
+    def _progress_text(self, bar: int) -> str:
         if self.progress is None:
             return ""
         done = min(bar, round(self.progress.share_done * bar))

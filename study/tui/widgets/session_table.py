@@ -14,17 +14,26 @@ from study.local_clock import machine_zone
 from study.session.views.archive_views import SessionLine
 from study.session.views.local_time import local_column
 from study.tui.home_messages import ResumeWanted, SessionWanted, WatchWanted
-from study.tui.standing_words import STYLES, standing_words
+from study.tui.session_status import STYLES, status_text
 
-_NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = "Session", "Standing", "Begun", "Runs", "Answers", "Protocol"
+_NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = (
+    "Session",
+    "Standing",
+    "SessionParticipant",
+    "Runs",
+    "Answers",
+    "Protocol",
+)
 _FIXED = {_STANDING: 12, _RUNS: 5, _ANSWERS: 7}
 """Widths in cells, so that little has to be measured in a long list. The protocol gets the remaining width, and
 wraps."""
 _LEAST_PROTOCOL, _PADDING = 10, 2
+"""Characters: least width of the protocol's column, and padding of a cell."""
 
 AT_ONCE = 60
 """Rows added at once: more than any terminal shows."""
 _BREATH_S = 0.01
+"""Pause between two batches of rows (s), in which keys are handled."""
 
 
 class SessionTable(DataTable[Content | str]):
@@ -60,7 +69,7 @@ class SessionTable(DataTable[Content | str]):
         for title, width in self._widths.items():
             self.add_column(title, width=width)
         self._add_more(lines, chosen.name if chosen is not None else "")
-        self._tell()
+        self._post_looked()
 
     def on_resize(self, event: Resize) -> None:
         if self._lines and event.size.width != self._fitted_to:
@@ -103,7 +112,7 @@ class SessionTable(DataTable[Content | str]):
         return self._lines[self.cursor_row] if 0 <= self.cursor_row < len(self._lines) else None
 
     def on_data_table_row_highlighted(self) -> None:
-        self._tell()
+        self._post_looked()
 
     def on_data_table_row_selected(self) -> None:
         if self._chosen is not None:
@@ -122,7 +131,7 @@ class SessionTable(DataTable[Content | str]):
         wanted = {"resume": "unfinished", "watch": "running"}.get(action)
         return wanted is None or (self._chosen is not None and self._chosen.standing == wanted)
 
-    def _tell(self) -> None:
+    def _post_looked(self) -> None:
         self.refresh_bindings()
         if self._chosen is not None:
             self.post_message(self.Looked(self._chosen))
@@ -131,5 +140,5 @@ class SessionTable(DataTable[Content | str]):
         known = line.standing in ("finished", "unfinished", "running")
         runs = (f"{line.runs_done}/{line.runs}" if known else "",) if _RUNS in self._widths else ()
         answers = (f"{line.answers:>7}" if known else "",) if _ANSWERS in self._widths else ()
-        standing = Content.styled(standing_words(line.standing), STYLES[line.standing])
+        standing = Content.styled(status_text(line.standing), STYLES[line.standing])
         return Content(line.name), standing, begun, *runs, *answers, Content(protocol)

@@ -15,6 +15,8 @@ _BESIDES = 2
 
 
 class StaircasePlot(Widget):
+    """A staircase, redrawn for the size of its widget."""
+
     DEFAULT_CSS = "StaircasePlot { height: 14; }"
 
     def __init__(self, staircase: Staircase, *, id: str | None = None) -> None:

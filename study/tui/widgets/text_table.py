@@ -7,6 +7,8 @@ from study.tui.text_rows import Rows, align_rows
 
 
 class TextTable(Static):
+    """Rows with aligned columns, as text."""
+
     DEFAULT_CSS = "TextTable { width: auto; height: auto; }"
 
     def __init__(self, rows: Rows, *, id: str | None = None) -> None:

@@ -28,7 +28,9 @@ CHANCE = 3.0
 """Standard errors of the two counts, as of independent events, within which a difference counts as chance."""
 
 COMPILING_S = 120.0
+"""Longest compilation of the C loop (s)."""
 OVERTIME_S = 30.0
+"""Longest delay of the C loop's end beyond its duration (s)."""
 NAME = "Bare C loop"
 ADVICE = (
     "The computer can do better than this loop did: close other programs, measure again, and report it if it stays."
@@ -43,20 +45,21 @@ class BareLoop:
     late_ticks: int
     """Ticks whose work ended after the next was due, missed ones included."""
     latest_s: float
-    before_others: bool
+    raised_priority: bool
     """Whether it got the real-time priority that was requested."""
 
 
 @dataclass(slots=True)
 class BareRun:
-    """result: None until the loop has ended; why: reason if there is none."""
+    """A bare loop that runs, or has run, beside the device's. result: None until the loop has ended; why: reason if
+    there is none."""
 
     result: BareLoop | None = None
     why: str = ""
 
 
 @contextlib.contextmanager
-def timed_beside(seconds: float, rate_hz: float, before_others: bool) -> Iterator[BareRun]:
+def run_bare_loop_beside(seconds: float, rate_hz: float, raised_priority: bool) -> Iterator[BareRun]:
     """Run a bare loop during the block or, where that is shorter, to its own end; the result is available after the
     block."""
     run = BareRun()
@@ -65,7 +68,7 @@ def timed_beside(seconds: float, rate_hz: float, before_others: bool) -> Iterato
         if program is None:
             yield run
             return
-        words = [str(program), f"{seconds:g}", f"{rate_hz:g}", str(PRIORITY if before_others else 0)]
+        words = [str(program), f"{seconds:g}", f"{rate_hz:g}", str(PRIORITY if raised_priority else 0)]
         try:
             process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
         except OSError as problem:
@@ -90,7 +93,8 @@ def _read(process: "subprocess.Popen[bytes]", seconds: float, run: BareRun) -> N
 
 
 def judge_beside(late_ticks: int, ticks: int, run: BareRun) -> DeviceFinding:
-    """late_ticks: of the loop beside it, missed ones included."""
+    """Compare the late ticks of the device's loop with those of the bare loop. late_ticks: of the loop beside it,
+    missed ones included."""
     if run.result is None:
         return DeviceFinding(NAME, f"not compared: {run.why}", fine=True)
     bare = run.result

@@ -12,7 +12,9 @@ from study.session.stimulus.limits import forces_in_words
 from study.session.views.views import DeviceFinding, DeviceReport
 
 LOOKS = 50
+"""Readings taken."""
 EVERY_S = 0.01
+"""Interval between them (s)."""
 
 ENOUGH = 0.9
 """Fraction of the reads that must succeed: a busy computer is late now and then."""
@@ -24,6 +26,7 @@ NOISY_MPS2 = 1.0
 """An accelerometer at rest has about 0.1 m/s² (its noise over 500 Hz); a trembling hand on the handle, up to 0.5."""
 
 RATE_HZ = 1000.0
+"""Rate of the loop for which stimuli are made (Hz)."""
 
 MM_PER_M = 1000.0
 
@@ -54,11 +57,11 @@ def check_device(
         sensors = (*sensors, _accelerometer(answered) if info.has_sensor else _no_accelerometer())
     largest = _largest_force(info, total_cap_n)
     made_of = (DeviceFinding("Force on a hand", forces_in_words(safety), fine=True),) if safety is not None else ()
-    findings = (_kind(info), _answers(len(answered)), *sensors, _rate(info), largest, *made_of)
+    findings = (_check_kind(info), _answers(len(answered)), *sensors, _rate(info), largest, *made_of)
     return DeviceReport(info.name, info.simulated, findings)
 
 
-def _kind(info: DeviceInfo) -> DeviceFinding:
+def _check_kind(info: DeviceInfo) -> DeviceFinding:
     kind = "simulated: no handle moves" if info.simulated else "a real device"
     return DeviceFinding("Device", f"{info.name} ({kind})", fine=True)
 

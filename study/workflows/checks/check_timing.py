@@ -23,8 +23,11 @@ from study.session.views.views import DeviceFinding
 from study.workflows.checks.bare_loop import BareLoop
 
 LOOP_S = 0.1
+"""Length of the loop of zero forces that is held (s)."""
 FADE_S = 0.05
+"""Fades of the held stimulus (s)."""
 SIGN_OF_LIFE_EVERY = 50
+"""Ticks between two signs of life to the safety layer."""
 
 SITTING_S = 1.0
 """Duration of the check before a sitting: a thousand wake-ups at 1 kHz, of which the 99th percentile is the tenth

@@ -35,7 +35,7 @@ BASELINES, CHECKS = "baselines", "daily_checks"
 
 
 @dataclass(frozen=True, slots=True)
-class Moving:
+class MotionCallbacks:
     """Callbacks while the device moves by itself."""
 
     announce: Callable[[str], None]
@@ -57,15 +57,15 @@ def seconds_of_play() -> float:
     return RecordingPlan(_protocol(), "", (0.0, 0.0, 0.0), 1, Path()).total_s
 
 
-def record_baseline(name: str, moving: Moving) -> tuple[str, str]:
+def record_baseline(name: str, moving: MotionCallbacks) -> tuple[str, str]:
     """Record the baseline of the daily checks. Returns its name in `device_folder` and its SHA-256. Raises StudyError,
     also where the recording is not good enough for a comparison."""
     plan = _plan(name, BASELINES)
-    with contextlib.closing(_open(plan)) as device:
+    with contextlib.closing(_open_free_device(plan)) as device:
         return _baseline_on(device, plan, moving)
 
 
-def _baseline_on(device: Device, plan: RecordingPlan, moving: Moving) -> tuple[str, str]:
+def _baseline_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> tuple[str, str]:
     record_on(device, plan, moving.show, moving.announce)
     recorded = read_recording(plan.out)
     facts = recorded.meta["segments"]
@@ -86,19 +86,19 @@ def _baseline_on(device: Device, plan: RecordingPlan, moving: Moving) -> tuple[s
 
 
 def require_real(name: str) -> None:
-    """Raises WrongUseError for a device that is never accepted."""
+    """Require a device that can be accepted. Raises WrongUseError for a device that is never accepted."""
     if not needs_real_time(name):
         raise WrongUseError("There is nothing to compare with", f"{name!r} is never accepted.", "Leave --daily out.")
 
 
-def check_today(name: str, moving: Moving) -> CheckedToday:
+def check_today(name: str, moving: MotionCallbacks) -> CheckedToday:
     """Play the excitation of the baseline and write what changed. Raises StudyError."""
     plan = _plan(name, CHECKS)
-    with contextlib.closing(_open(plan)) as device:
+    with contextlib.closing(_open_free_device(plan)) as device:
         return check_on(device, plan, moving)
 
 
-def check_on(device: Device, plan: RecordingPlan, moving: Moving) -> CheckedToday:
+def check_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> CheckedToday:
     """Carry out the check of `check_today` on an open device."""
     baseline, digest = _accepted_recording(device.info, plan.protocol)
     begun: list[str] = []
@@ -147,7 +147,8 @@ def _write_check(
 
 
 def compare_recordings(baseline: Recording, today: Recording) -> tuple["Change", ...]:
-    """Raises DeviceError where one of them does not tell what is compared."""
+    """Changes between the accepted recording and today's. Raises DeviceError where one of them does not tell what is
+    compared."""
     # Imported here: every sitting reads the last check, but only a check needs the comparison, which is slow to import.
     from analysis.device_change.compare_devices import compare_devices
     from analysis.device_change.measure_device import NotMeasurableError
@@ -242,7 +243,7 @@ def _moment() -> str:
     return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
 
 
-def _open(plan: RecordingPlan) -> Device:
+def _open_free_device(plan: RecordingPlan) -> Device:
     return open_device(plan.device, recording_settings(plan), RealClock(), plan.seed)
 
 

@@ -30,7 +30,7 @@ def change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ...]:
 
 def _finding(kind: str, changes: Sequence["Change"], rubs: bool) -> DeviceFinding:
     """rubs: whether the friction changed, which also changes gain and response."""
-    value = f"{'; '.join(_words(change) for change in changes)} ({_limit_words(changes[0])})"
+    value = f"{'; '.join(_change_text(change) for change in changes)} ({_limit_words(changes[0])})"
     axes = ", ".join(change.axis for change in changes if change.changed)
     causes = FRICTION_FIRST if rubs and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"
     advice = f"It changed ({axes}). {causes}"
@@ -41,7 +41,7 @@ def _finding(kind: str, changes: Sequence["Change"], rubs: bool) -> DeviceFindin
     return DeviceFinding(kind.capitalize(), value, fine=True)
 
 
-def _words(change: "Change") -> str:
+def _change_text(change: "Change") -> str:
     match change.kind:
         case "gain":
             return f"{change.axis} {signed_number(100 * (change.today - 1), 1)} %"

@@ -7,18 +7,18 @@ from pathlib import Path
 
 from study.devices.clock import Clock, RealClock
 from study.devices.device import Device, DeviceSettings
-from study.devices.opening import accept_device, examine_device, needs_real_time, open_device, proof_force_n
+from study.devices.opening import accept_device, examine_device, limit_test_force_n, needs_real_time, open_device
 from study.errors import DeviceError, ExitCode, WrongUseError
 from study.session.stimulus.timing_verdict import judge_load
-from study.session.views.handle_notice import proof_notice
+from study.session.views.handle_notice import limit_test_notice
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.store.formats.protocol_files import read_study_protocol
-from study.workflows.checks.bare_loop import judge_beside, timed_beside
+from study.workflows.checks.bare_loop import judge_beside, run_bare_loop_beside
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_installation import Terminal, check_installation
 from study.workflows.checks.check_timing import Timing, check_timing
 from study.workflows.checks.computer_load import load_per_processor
-from study.workflows.checks.daily_check import Moving, record_baseline
+from study.workflows.checks.daily_check import MotionCallbacks, record_baseline
 from study.workflows.device_settings import device_settings
 
 PROTOCOL = "direction_threshold"
@@ -94,7 +94,7 @@ def _examine_device(
 
 def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
     load, simulated = load_per_processor(), device.info.simulated
-    with timed_beside(seconds, device.info.sample_rate_hz, before_others=not simulated) as run:
+    with run_bare_loop_beside(seconds, device.info.sample_rate_hz, raised_priority=not simulated) as run:
         timing = check_timing(device, clock, seconds, on_progress, load)
     # A simulated device's own loop is never late: there, the wake-ups of this program are compared.
     late, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks
@@ -115,7 +115,8 @@ def _settings(name: str, timing_s: float) -> DeviceSettings:
 
 
 def require_sensor(examination: Examination) -> None:
-    """Raises DeviceError where a daily check would record no acceleration."""
+    """Require an accelerometer for a daily check. Raises DeviceError where a daily check would record no
+    acceleration."""
     if not examination.sensed:
         raise DeviceError(
             "The daily check did not begin",
@@ -125,7 +126,7 @@ def require_sensor(examination: Examination) -> None:
         )
 
 
-def accept(name: str, examination: Examination, operator: str, moving: Moving) -> str:
+def accept(name: str, examination: Examination, operator: str, moving: MotionCallbacks) -> str:
     """Record the baseline of the daily checks and sign that the device may be held, after an examination with timing.
     Without an accelerometer there is no baseline. Raises DeviceError, WrongUseError."""
     if not needs_real_time(name):
@@ -137,7 +138,7 @@ def accept(name: str, examination: Examination, operator: str, moving: Moving) -
         raise DeviceError("The device was not accepted", f"Not fine: {found}.", "Mend that first, as said above.")
     sensed = examination.sensed
     baseline = record_baseline(name, moving) if sensed else ("", "")
-    moving.announce(proof_notice(name, proof_force_n()))
+    moving.announce(limit_test_notice(name, limit_test_force_n()))
     settings = replace(_settings(name, 0.0), with_sensor=sensed)
     sentence = accept_device(name, settings, RealClock(), operator, baseline)
     return sentence if sensed else f"{sentence}. Without an accelerometer no daily check will be possible."

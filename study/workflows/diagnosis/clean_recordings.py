@@ -13,14 +13,14 @@ NOT_ALIKE = "Give clean recordings of the same device, with the same channels, u
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WithClean:
+class InputWithReference:
     """Input of a diagnosis and its clean reference, reduced to the signals that both have."""
 
     found: DiagnosisInput
     clean: DiagnosisInput
 
 
-def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[Path], seed: int) -> WithClean:
+def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[Path], seed: int) -> InputWithReference:
     """Both inputs with matching channels, units and rate. sources: origin of `found`; clean: reference recordings,
     or one session's folder. Raises StudyError."""
     known = {source.resolve() for source in sources}
@@ -42,7 +42,7 @@ def with_clean(found: DiagnosisInput, sources: Sequence[Path], clean: Sequence[P
         raise not_diagnosable_error(refusal.problems, NOT_ALIKE) from refusal
     number = len(found.recordings)
     every = keep_common_signals((*found.recordings, *beside.recordings))
-    return WithClean(
+    return InputWithReference(
         replace(found, recordings=every.recordings[:number], remarks=(*found.remarks, *every.remarks)),
         replace(beside, recordings=every.recordings[number:]),
     )

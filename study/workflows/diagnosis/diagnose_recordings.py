@@ -20,6 +20,7 @@ from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from equalizer.effects.law_entry import LawEntry
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, suggest_word
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
@@ -31,7 +32,6 @@ from study.workflows.diagnosis.diagnosis_input import (
     read_given_model,
     read_input,
 )
-from study.workflows.diagnosis.spring_in_model import spring_words, with_spring
 from study.workflows.forked_map import map_forked, processor_s
 
 READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
@@ -124,7 +124,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     _check_compared(plan, found, held)
     settings = replace(_settings(plan, found, clean, first.balances), time_left=time_left, guard=guard)
     try:
-        findings = engine(found.recordings, held, settings, map_forked, _within(on_progress, begun, DIAGNOSED))
+        findings = engine(found.recordings, held, settings, map_forked, _scale_progress(on_progress, begun, DIAGNOSED))
     except NothingLearned as refusal:
         raise not_diagnosable_error(
             (str(refusal),), "Leave --clean out, or record the device in order in the same way."
@@ -137,7 +137,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     findings = replace(
         findings,
         improved=with_spring(findings.improved, -spring),
-        remarks=(*found.remarks, *spring_words(spring), *first.remarks, *findings.remarks),
+        remarks=(*found.remarks, *spring_remark(spring), *first.remarks, *findings.remarks),
     )
     return Answer(
         findings, plan, (*found.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
@@ -217,7 +217,7 @@ def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: Mechanical
 
 
 def check_names(without: Sequence[str]) -> None:
-    """Raises WrongUseError for a name that no effect has."""
+    """Check the names of effects to leave out. Raises WrongUseError for a name that no effect has."""
     for name in without:
         if name not in EFFECTS_BY_NAME:
             raise WrongUseError(
@@ -235,7 +235,7 @@ def _model(
     bounds: tuple[TimeBudget, Guard],
     on_progress: Progress,
 ) -> FirstModel:
-    within = _within(on_progress, READ, FITTED)
+    within = _scale_progress(on_progress, READ, FITTED)
     if plan.model is not None:
         return FirstModel(read_given_model(plan.model, found), ())
     if found.simulated:
@@ -260,5 +260,23 @@ def _twin(on_progress: Progress) -> MechanicalModel:
         return write_twin(plan, lambda share: on_progress(what, share)).model
 
 
-def _within(on_progress: Progress, begin: float, end: float) -> Callable[[str, float], None]:
+def _scale_progress(on_progress: Progress, begin: float, end: float) -> Callable[[str, float], None]:
     return lambda what, share: on_progress(what, begin + (end - begin) * min(max(share, 0.0), 1.0))
+
+
+def with_spring(model: MechanicalModel, spring_n_per_m: float) -> MechanicalModel:
+    """The model with this stiffness added along every driven axis; a negative one is subtracted."""
+    if spring_n_per_m == 0:
+        return model
+    axes = driven_axes(model)
+    return replace(model, stiffness=model.stiffness + spring_n_per_m * axes @ axes.T)
+
+
+def spring_remark(spring_n_per_m: float) -> tuple[str, ...]:
+    """Remark about the spring; empty if there is none."""
+    if spring_n_per_m == 0:
+        return ()
+    return (
+        f"A virtual spring of {spring_n_per_m:.0f} N/m held the handle at its place. It was added to the model for the "
+        "comparison, and is not in improved.toml.",
+    )

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_alike, require_model_of
 from analysis.diagnosis.prepare_recordings import comparable, prepare
 from analysis.wording import begin_sentence
@@ -83,6 +82,8 @@ def _as_forces(
     """The recordings with commands as forces, and remarks. Raises WrongUseError."""
     if not constants:
         return recordings, ()
+    from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
+
     try:
         found = [with_force_constant(recording, constants) for recording in recordings]
     except NoForceConstant as refusal:

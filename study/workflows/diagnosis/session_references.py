@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.session.facts.events import ProbeMeasured, ProbePlayed
-from study.session.watching.watched import begin_watching, follow
+from study.session.watching.followed_session import begin_watching, follow
 from study.store.disk.provenance import sha256_of
 from study.store.sessions.archive import SessionFolder, find_session
 from study.workflows.results.fold_session import FoldedSession, fold_session

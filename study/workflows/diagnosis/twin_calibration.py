@@ -13,7 +13,8 @@ LEAST_PER_M = 0.05
 
 
 def check_same_device(calibration: LinkageCalibration, device: str, title: str) -> None:
-    """Raises StudyError where the calibration is of another device than the one that was recorded."""
+    """Check that calibration and recording are of the same device. Raises StudyError where the calibration is of
+    another device than the one that was recorded."""
     if calibration.device != device:
         raise StudyError(
             title,

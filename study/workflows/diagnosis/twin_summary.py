@@ -47,9 +47,9 @@ def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
     model, fit, tolerance = written.model, written.fit, written.model.tolerance
     piece = written.piece
     lines = [
-        f"As one piece, up to {piece.up_to_hz:.3g} Hz: mass {_words(piece.mass)} kg{_about(tolerance, 'mass_kg')}, "
-        f"damping {_words(piece.damping)} N s/m, {_words(piece.of_friction)} N s/m of it friction's and taken off"
-        f"{_about(tolerance, 'damping_n_s_per_m')}",
+        f"As one piece, up to {piece.up_to_hz:.3g} Hz: mass {_values(piece.mass)} kg{_range(tolerance, 'mass_kg')}, "
+        f"damping {_values(piece.damping)} N s/m, {_values(piece.of_friction)} N s/m of it friction's and taken off"
+        f"{_range(tolerance, 'damping_n_s_per_m')}",
     ]
     if modes := _modes_hz(written):
         swing = ", ".join(f"{each:.3g}" for each in modes)
@@ -69,10 +69,10 @@ def _modes_hz(written: WrittenTwin) -> list[float]:
     return sorted(float(each) for each in np.sqrt(np.maximum(ratio, 0.0)) / (2 * np.pi))
 
 
-def _words(values: FloatArray) -> str:
+def _values(values: FloatArray) -> str:
     return ", ".join(typeset(f"{value:.3g}") for value in values)
 
 
-def _about(tolerance: Tolerance | None, name: str) -> str:
+def _range(tolerance: Tolerance | None, name: str) -> str:
     value = None if tolerance is None else getattr(tolerance, name)
     return "" if value is None else f" (± {value:.2g})"

@@ -1,4 +1,8 @@
-"""Compute a table of forces from a table of wanted accelerations and models of the device."""
+"""`hapteq equalize`: a table of forces from a table of wanted accelerations and identified models of the device.
+
+The forces are the feedforward of an LQR tracker (`equalizer.tracking.feedforward`) under the cap. With `--physics`, the
+forces of known nonlinear effects along the predicted motion are added. Each refusal names its cause and a remedy.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -9,7 +13,7 @@ import numpy as np
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.tracking.bands.narrow_and_wide_models import BandFacts, banded_feedforward
-from equalizer.tracking.compensation.known_physics import Compensation, compensate
+from equalizer.tracking.compensation.effect_compensation import Compensation, compensate
 from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
 from equalizer.tracking.lqr.limits import ForceLimitError, Peaks, require_under_cap
@@ -17,20 +21,20 @@ from equalizer.tracking.workspace.feedforward_at_place import feedforward_at
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
-from study.workflows.equalizer.models_for_playing import ModelsForPlaying, Vector, models_for_playing, peak_gain
+from study.workflows.equalizer.playback_models import PlaybackModels, Vector, peak_gain, read_playback_models
 from study.workflows.free_name import require_free
 
 HIGHEST_MPS2 = 1e4
-"""Largest accepted acceleration, a thousand times gravity: beyond it the table is wrong."""
-NOT_REACHED = 0.5
-"""Predicted error above which the forces do not reproduce the wanted signal."""
-NO_WEIGHT = 1e-7
-"""Ratio of the root of the weight to the model's gain below which the weight is lost in rounding."""
+"""Largest accepted acceleration (m/s^2), a thousand times gravity: beyond it the table's unit is wrong."""
+LARGEST_ERROR = 0.5
+"""Predicted error, relative to the wanted signal, above which forces are refused: half of it would be missed."""
+LEAST_WEIGHT_RATIO = 1e-7
+"""Ratio of the root of the force's weight to the model's gain below which the weight is lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class EqualizePlan:
-    """Order of an equalization: files of identified models, table of wanted accelerations, table of forces to write.
+    """Request of an equalization: files of identified models, table of wanted accelerations, table of forces to write.
     at_m: place in the workspace (m); constrain: keep the forces below the cap instead of refusing."""
 
     models: tuple[Path, ...]
@@ -38,6 +42,7 @@ class EqualizePlan:
     out: Path
     at_m: Vector | None = None
     weight: float = 1e-3
+    """Weight of the forces in the tracker's cost."""
     cap_n: float = 3.0
     constrain: bool = False
     physics: Path | None = None
@@ -52,7 +57,7 @@ class EqualizedTrajectory:
     wanted: Trajectory
     forces: Trajectory
     """Total forces on the device, including a spring's share."""
-    models: ModelsForPlaying
+    models: PlaybackModels
     solved: Feedforward
     """Feedforward from the linear models alone."""
     peaks: Peaks
@@ -72,7 +77,7 @@ def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     """Read and solve without writing. Raises StudyError."""
     wanted = _read_wanted(plan.trajectory)
-    models = models_for_playing(plan.models, plan.at_m, plan.weight)
+    models = read_playback_models(plan.models, plan.at_m, plan.weight)
     physics = None if plan.physics is None else read_mechanical_model(plan.physics)
     amplitude_n = None if physics is None else _amplitude_n(models.nearest)
     try:
@@ -125,11 +130,11 @@ def _read_wanted(path: Path) -> Trajectory:
     return trajectory
 
 
-def _require_weight(plan: EqualizePlan, models: ModelsForPlaying) -> None:
-    if math.sqrt(plan.weight) < NO_WEIGHT * max(peak_gain(model) for model in models.given):
+def _require_weight(plan: EqualizePlan, models: PlaybackModels) -> None:
+    if math.sqrt(plan.weight) < LEAST_WEIGHT_RATIO * max(peak_gain(model) for model in models.given):
         raise StudyError(
             "The forces were not computed",
-            f"With --weight {plan.weight:g} nothing keeps forces finite that the model hardly answers.",
+            f"--weight {plan.weight:g} is too small to keep forces finite where the model hardly moves.",
             "Give a weight above zero, such as --weight 0.001.",
             saved="Nothing was written.",
         )
@@ -139,7 +144,7 @@ def _require_reached(plan: EqualizePlan, solved: Feedforward, in_bands: bool) ->
     """Raise if the models cannot reproduce the wanted signal. Where the cap costs accuracy, the error without the
     cap decides."""
     missed = solved.error if solved.loss is None else solved.loss.error_free
-    if not missed <= NOT_REACHED and in_bands:
+    if not missed <= LARGEST_ERROR and in_bands:
         raise StudyError(
             "The forces were not computed",
             f"By the model itself the best forces would miss {100 * missed:.0f} % of what is wanted: three bands have "
@@ -147,17 +152,17 @@ def _require_reached(plan: EqualizePlan, solved: Feedforward, in_bands: bool) ->
             "Put 3 s of zeros before and after what is wanted, or give one model.",
             saved="Nothing was written.",
         )
-    if not missed <= NOT_REACHED:
+    if not missed <= LARGEST_ERROR:
         raise StudyError(
             "The forces were not computed",
             f"By the model itself the best forces would miss {100 * missed:.0f} % of what is wanted: along some "
-            f"direction it answers hardly anything, for --weight {plan.weight:g}.",
+            f"direction it hardly moves, for --weight {plan.weight:g}.",
             "Check units and axes of the recording that it was made from and identify it again, or lower --weight.",
             saved="Nothing was written.",
         )
 
 
-def _solve(plan: EqualizePlan, wanted: Trajectory, models: ModelsForPlaying) -> tuple[Feedforward, BandFacts | None]:
+def _solve(plan: EqualizePlan, wanted: Trajectory, models: PlaybackModels) -> tuple[Feedforward, BandFacts | None]:
     settings = FeedforwardSettings(plan.weight, plan.cap_n, plan.constrain)
     if models.two is None:
         return feedforward_at(models.at, wanted.signal, settings), None
@@ -173,9 +178,9 @@ def _amplitude_n(model: IdentifiedModel) -> float | None:
     if not found > 0:
         raise StudyError(
             "Known physics cannot be compensated with this model",
-            "The model does not say with which force it was identified, and friction acts on it by that force: some of "
-            "it is in the model already and would be counted twice.",
-            "Identify it again from recordings whose segments say their amplitude, or leave out --physics.",
+            "The model's file does not state the force amplitude of its identification. The damping that friction adds "
+            "depends on it: some friction is in the model already and would be counted twice.",
+            "Identify it again from recordings whose segments state their amplitude, or leave out --physics.",
             saved="Nothing was written.",
         )
     return float(found)
@@ -192,7 +197,7 @@ def _compensate(
         found = compensate(solved.forces.samples, solved.wanted, model, physics, amplitude_n, plan.cap_n)
     except ValueError as problem:
         raise StudyError(
-            "The known physics do not go with the model",
+            "The known physics does not fit the model",
             f"{plan.physics}: {problem}.",
             "Correct the [[effect]] sections, or leave out --physics.",
             saved="Nothing was written.",
@@ -204,6 +209,6 @@ def _not_equalized(happened: str) -> StudyError:
     return StudyError(
         "The forces were not computed",
         happened,
-        "Correct what is named, or give a table and a model that go together.",
+        "Correct what is named, or give a table and a model that fit each other.",
         saved="Nothing was written.",
     )

@@ -148,7 +148,7 @@ def _at_place(
         "amplitude_n": _amplitude_n(recordings) if physics is None else None,
         "freed_of": [] if physics is None else removable_effects(physics),
     }
-    return replace(model, place_m=_place(recordings), provenance=provenance)
+    return replace(model, place_m=_common_place(recordings), provenance=provenance)
 
 
 def _amplitude_n(recordings: Sequence[Recording]) -> float:
@@ -182,7 +182,7 @@ def _from_excitation(recording: Recording) -> Recording:
     return replace(recording, command=recording.excitation)
 
 
-def _place(recordings: Sequence[Recording]) -> tuple[float, float, float] | None:
+def _common_place(recordings: Sequence[Recording]) -> tuple[float, float, float] | None:
     places = [recording.meta["place_m"] for recording in recordings if recording.meta.get("place_m") is not None]
     if not places:
         return None

@@ -33,7 +33,6 @@ from study.store.disk.json_document import write_json
 from study.store.disk.new_folder import new_folder, require_new_folder
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
-from study.workflows.equalizer.models_for_playing import ModelsForPlaying, Vector, models_for_playing
 from study.workflows.equalizer.play_forces import (
     acting_spring,
     announce_motion,
@@ -42,6 +41,7 @@ from study.workflows.equalizer.play_forces import (
     playback_settings,
     require_device_alone,
 )
+from study.workflows.equalizer.playback_models import PlaybackModels, Vector, read_playback_models
 
 GAIN_LINES = 100
 """Number of lines in the band over which the gain of the comparison is averaged."""
@@ -106,7 +106,7 @@ def play_contact(
     require_new_folder(plan.out)
     normal = _unit(plan.normal)
     transient = _transient(plan)
-    models = models_for_playing((plan.model,), None, plan.weight)
+    models = read_playback_models((plan.model,), None, plan.weight)
     require_device_alone(models)
     model, rate_hz = models.nearest, models.nearest.sample_rate_hz
     try:
@@ -116,7 +116,7 @@ def play_contact(
     except ValueError as problem:
         raise _refusal(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
     tracked = start.basis.forces(normal)
-    wanted = _along(recording, normal, len(tracked))
+    wanted = _along_normal(recording, normal, len(tracked))
     forces = (
         _within_cap(_fade_out(_beside_spring(tracked, wanted, models), rate_hz), plan, rate_hz),
         _within_cap(_plain_forces(model, wanted), plan, rate_hz),
@@ -155,11 +155,11 @@ def _transient(plan: ContactPlan) -> Trajectory:
     return found
 
 
-def _along(recording: FloatArray, normal: FloatArray, rows: int) -> FloatArray:
+def _along_normal(recording: FloatArray, normal: FloatArray, rows: int) -> FloatArray:
     return np.outer(np.pad(recording, (0, rows - len(recording))), normal)
 
 
-def _beside_spring(forces: FloatArray, wanted: FloatArray, models: ModelsForPlaying) -> FloatArray:
+def _beside_spring(forces: FloatArray, wanted: FloatArray, models: PlaybackModels) -> FloatArray:
     """Commands less the force of the spring along the wanted motion."""
     commands = compensate_spring(lambda _: forces, acting_spring(models), models.nearest.sample_rate_hz, models.band_hz)
     return commands(wanted)
@@ -190,7 +190,7 @@ def _within_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatA
 
 def _play_both(
     plan: ContactPlan,
-    models: ModelsForPlaying,
+    models: PlaybackModels,
     forces: tuple[FloatArray, FloatArray],
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving,
@@ -214,7 +214,7 @@ def _play_both(
         try:
             announce_motion(device, plan.cap_n, total_s, before_moving)
             for each in forces:
-                measured.append(_play(device, each, advance))
+                measured.append(_play_transient(device, each, advance))
         except KeyboardInterrupt as interruption:
             if device.fault() is Fault.FORCE_LEFT:
                 raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, AGAIN, NOTHING) from None
@@ -223,7 +223,7 @@ def _play_both(
     return measured
 
 
-def _settings(plan: ContactPlan, models: ModelsForPlaying, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
+def _settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
     """Settings of the device, without fade-in: a force that begins with the contact begins with a step."""
     settings, rate_hz = playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
     steps = [np.linalg.norm(np.diff(each, axis=0, prepend=0, append=0), axis=1).max() for each in forces]
@@ -231,14 +231,14 @@ def _settings(plan: ContactPlan, models: ModelsForPlaying, forces: tuple[FloatAr
     return replace(settings, limits=replace(settings.limits, slew_n_per_s=slew_n_per_s))
 
 
-def _play(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
+def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
     """(N, 3), m/s^2, of the rows of the forces."""
     settle = round(SETTLE_S * device.info.sample_rate_hz)
     padded = np.pad(forces, ((settle, settle), (0, 0)))
     return measured_acceleration(play_forces(device, padded, on_share))[settle : settle + len(forces)]
 
 
-def _write(done: ContactPlay, models: ModelsForPlaying) -> None:
+def _write(done: ContactPlay, models: PlaybackModels) -> None:
     from analysis.figures.contact_transient import contact_picture
     from study.workflows.picture_files import write_pictures
 

@@ -11,17 +11,20 @@ from study.devices.device import Device, DeviceSettings, Fault, Played
 from study.errors import DeviceError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
 from study.session.views.handle_notice import BeforeMoving, free_handle_notice
-from study.workflows.equalizer.models_for_playing import ModelsForPlaying
+from study.workflows.equalizer.playback_models import PlaybackModels
 from study.workflows.equalizer.spring_not_in_model import spring_outside_model
 
 SPRING_HZ = 3.5
 """Spring of the shipped recordings, for a model that does not state its spring."""
 SPRING_ROOM_N = 1.5
+"""Force that the virtual spring may add to the cap (N)."""
 HAND_CAP_N = 3.0
+"""Largest cap with a hand on the handle (N), as in any protocol."""
 
 
-def require_device_alone(models: ModelsForPlaying) -> None:
-    """Raises StudyError for a model that was identified with a hand on the handle."""
+def require_device_alone(models: PlaybackModels) -> None:
+    """Require a model of the device without a hand. Raises StudyError for a model that was identified with a hand on
+    the handle."""
     if any("held" in model.provenance.get("hand", ()) for model in models.given):
         raise _refusal(
             "The model was recorded with a hand on the handle: its forces are right for that hand in that moment.",
@@ -29,7 +32,7 @@ def require_device_alone(models: ModelsForPlaying) -> None:
         )
 
 
-def acting_spring(models: ModelsForPlaying) -> VirtualSpring:
+def acting_spring(models: PlaybackModels) -> VirtualSpring:
     """The spring that adds to the commands and is not in the model. Raises StudyError where it is not known."""
     feedback = _feedback(models)
     acting = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
@@ -42,12 +45,12 @@ def acting_spring(models: ModelsForPlaying) -> VirtualSpring:
     return spring_outside_model(models.nearest, acting)
 
 
-def _feedback(models: ModelsForPlaying) -> dict[str, Any]:
+def _feedback(models: PlaybackModels) -> dict[str, Any]:
     found = models.nearest.provenance.get("feedback")
     return found if isinstance(found, dict) else {}
 
 
-def playback_settings(cap_n: float, models: ModelsForPlaying) -> DeviceSettings:
+def playback_settings(cap_n: float, models: PlaybackModels) -> DeviceSettings:
     """The spring of the recordings; steps up to what forces at the upper end of the band do at the cap."""
     feedback = _feedback(models)
     steepest = 2 * math.pi * models.band_hz[1] * cap_n

@@ -24,12 +24,12 @@ from study.workflows.equalizer.equalize_trajectory import (
     solve_trajectory,
 )
 from study.workflows.equalizer.equalized_summary import summary, summary_lines
-from study.workflows.equalizer.models_for_playing import ModelsForPlaying
 from study.workflows.equalizer.play_forces import (
     acting_spring,
     playback_settings,
     require_device_alone,
 )
+from study.workflows.equalizer.playback_models import PlaybackModels
 from study.workflows.equalizer.repeat_playback import OnProgress, repeat_playback
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, earlier_forces
 
@@ -144,7 +144,7 @@ def _convergence_line(done: RepeatedTrajectory) -> str:
     )
 
 
-def _require_repeatable(models: ModelsForPlaying) -> None:
+def _require_repeatable(models: PlaybackModels) -> None:
     if models.two is not None:
         raise _refusal(
             "Two bands of one place were given, and what is felt of the upper one is no waveform to be corrected.",

@@ -11,8 +11,7 @@ from study.regular_file import DOCUMENT_BYTES
 from study.store.disk.file_errors import CannotReadError, UnusableFileError
 from study.store.disk.hdf5_file import format_of, is_hdf5
 from study.store.disk.strict_json import load_json
-from study.store.disk.text_file import read_text
-from study.store.disk.toml_text import TOML_BYTES, too_long_key
+from study.store.disk.text_file import TOML_BYTES, read_text, too_long_key
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +43,7 @@ class FileContent:
 
 
 def open_content(path: Path) -> FileContent:
-    """Raises CannotReadError, UnusableFileError."""
+    """Open a file once, for all recognisers. Raises CannotReadError, UnusableFileError."""
     try:
         if path.is_dir():
             return FileContent(path, is_folder=True)

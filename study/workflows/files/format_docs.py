@@ -210,7 +210,7 @@ def documents() -> dict[str, str]:
 
 
 def write_documents(folder: Path) -> None:
-    """Raises CannotWriteError."""
+    """Write docs/formats.md, docs/importing.md and the schemas. Raises CannotWriteError."""
     for name, text in documents().items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         write_text(folder / name, text, overwrite=True)

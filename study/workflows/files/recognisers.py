@@ -68,6 +68,7 @@ def describe_recording(found: Recording) -> str:
 
 
 def recognise_identified_model(content: FileContent) -> str | None:
+    """An identified model."""
     if content.hdf5_format != identified_model_file.FORMAT:
         return None
     found = read_identified_model(content.path)
@@ -80,6 +81,7 @@ def recognise_identified_model(content: FileContent) -> str | None:
 
 
 def recognise_calibration(content: FileContent) -> str | None:
+    """A calibration of a linkage."""
     if content.hdf5_format != calibration_file.FORMAT:
         return None
     found = read_calibration(content.path)
@@ -137,6 +139,7 @@ def recognise_protocol(content: FileContent) -> str | None:
 
 
 def recognise_diagnosis(content: FileContent) -> str | None:
+    """A diagnosis."""
     if content.json_format != DIAGNOSIS_FORMAT:
         return None
     found = read_diagnosis(content.path)
@@ -144,6 +147,7 @@ def recognise_diagnosis(content: FileContent) -> str | None:
 
 
 def recognise_daily_check(content: FileContent) -> str | None:
+    """A daily check of a device."""
     if content.json_format != DAILY_CHECK_FORMAT:
         return None
     found = read_daily_check(content.path)
@@ -151,6 +155,7 @@ def recognise_daily_check(content: FileContent) -> str | None:
 
 
 def recognise_repeats(content: FileContent) -> str | None:
+    """The document beside a table of repeated playback."""
     if content.json_format != REPEATS_FORMAT:
         return None
     found = read_repeats(content.path)
@@ -161,6 +166,7 @@ def recognise_repeats(content: FileContent) -> str | None:
 
 
 def recognise_real_answer(content: FileContent) -> str | None:
+    """The diagnosis of a real recording."""
     if content.json_format != REAL_ANSWER_FORMAT:
         return None
     found = read_real_answer(content.path)
@@ -168,6 +174,7 @@ def recognise_real_answer(content: FileContent) -> str | None:
 
 
 def recognise_reproduction(content: FileContent) -> str | None:
+    """A reproduction of the published figures."""
     if content.json_format != REPRODUCTION_FORMAT:
         return None
     found = read_reproduction(content.path)

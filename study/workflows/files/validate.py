@@ -13,7 +13,7 @@ from study.regular_file import DOCUMENT_BYTES
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.privacy import privacy_warning
 from study.store.disk.strict_json import load_json
-from study.store.disk.toml_text import TOML_BYTES, too_long_key
+from study.store.disk.text_file import TOML_BYTES, too_long_key
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import FOLDER
 from study.workflows.files.file_content import FileContent, open_content

@@ -17,18 +17,18 @@ START_S = 300.0
 
 def validate_files(paths: Sequence[Path], patience_s: float = PATIENCE_S) -> Iterator[Validation]:
     """Validation of each file, in order. One worker serves all and is replaced when a file crashes it."""
-    worker = _worker()
+    worker = _start_worker()
     try:
         for path in paths:
             try:
                 yield worker.submit(_validate_safely, path).result(timeout=patience_s)
             except BrokenProcessPool:
                 yield _damage_report(path, "reading it crashes the HDF5 library")
-                worker = _worker()
+                worker = _start_worker()
             except TimeoutError:
                 yield _damage_report(path, f"reading it does not end within {patience_s:g} s")
                 _kill(worker)
-                worker = _worker()
+                worker = _start_worker()
     finally:
         worker.shutdown(wait=False, cancel_futures=True)
 
@@ -41,7 +41,7 @@ def _validate_safely(path: Path) -> Validation:
         return Validation(path, "unknown", (f"hapteq failed on this file ({type(error).__name__}: {error}).",))
 
 
-def _worker() -> ProcessPoolExecutor:
+def _start_worker() -> ProcessPoolExecutor:
     # Spawned: a forked child would inherit HDF5's locks.
     worker = ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
     # How long it takes to start is the machine's affair, and no fault of a file.

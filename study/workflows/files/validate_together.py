@@ -13,10 +13,10 @@ from study.workflows.files.validate import Validation
 
 def check_together(found: Sequence[Validation]) -> tuple[Validation, ...]:
     """Valid files with problems between them; a model is compared with recordings of as many commands and responses."""
-    recordings = [(each.path, read_recording(each.path)) for each in _sound(found, "recording, ")]
+    recordings = [(each.path, read_recording(each.path)) for each in _valid_of_kind(found, "recording, ")]
     if not recordings:
         return tuple(found)
-    models = {each.path: read_mechanical_model(each.path) for each in _sound(found, "mechanical model ")}
+    models = {each.path: read_mechanical_model(each.path) for each in _valid_of_kind(found, "mechanical model ")}
     return tuple(
         replace(each, problems=(*each.problems, *_problems(models[each.path], recordings)))
         if each.path in models
@@ -25,7 +25,7 @@ def check_together(found: Sequence[Validation]) -> tuple[Validation, ...]:
     )
 
 
-def _sound(found: Sequence[Validation], kind: str) -> Iterator[Validation]:
+def _valid_of_kind(found: Sequence[Validation], kind: str) -> Iterator[Validation]:
     return (each for each in found if each.kind.startswith(kind) and not each.problems)
 
 

@@ -24,7 +24,7 @@ from study.store.disk.json_document import write_json
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import read_text
 from study.workflows.picture_files import write_pictures
-from study.workflows.pieces import finished_pieces
+from study.workflows.run_on_executor import finished_pieces
 
 CHUNK = 10
 """Studies per piece of work: some seconds, so that little is lost when a worker dies."""

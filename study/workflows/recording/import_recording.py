@@ -87,15 +87,15 @@ def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progr
     """Import recordings into memory; nothing is written. Raises StudyError."""
     if map_name is not None:
         source = read_map(map_name)
-        return _by_map(source, _inside(files, source.map), on_progress)
+        return _by_map(source, _expand_folders(files, source.map), on_progress)
     if len(files) == 1 and files[0].is_dir():
         return _by_found_map(files[0], on_progress)
     if all(is_hdf5(path) and format_of(path) == FORMAT for path in files):
-        return _ours(files)
+        return _read_own(files)
     return _by_header(files, on_progress)
 
 
-def _inside(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...]:
+def _expand_folders(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...]:
     """The files; of a folder, those that the map applies to, without maps and notes."""
     found: list[Path] = []
     for path in files:
@@ -132,7 +132,7 @@ def _by_found_map(folder: Path, on_progress: Progress) -> Foreign:
     )
 
 
-def _ours(files: Sequence[Path]) -> Foreign:
+def _read_own(files: Sequence[Path]) -> Foreign:
     recordings = [read_recording(path) for path in files]
     if len(recordings) == 1:
         return Foreign(recordings[0], tuple(files), "recording", "", ())

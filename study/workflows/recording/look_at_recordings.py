@@ -59,10 +59,10 @@ def recording_facts(found: Overview) -> tuple[str, ...]:
 
 def look_document(found: Sequence[Overview]) -> list[dict[str, Any]]:
     """One entry per recording, numbers in SI."""
-    return [_entry(each) for each in found]
+    return [_recording_entry(each) for each in found]
 
 
-def _entry(each: Overview) -> dict[str, Any]:
+def _recording_entry(each: Overview) -> dict[str, Any]:
     recording = each.recording
     return {
         "recording": each.name,

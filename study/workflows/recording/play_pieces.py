@@ -18,7 +18,7 @@ MOST_TRIES = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Take:
+class PlayedPiece:
     """A piece as finally played, clean unless `clipped`."""
 
     piece: Piece
@@ -46,7 +46,7 @@ def is_clipped(health: Health) -> bool:
 
 
 def play_pieces(
-    protocol: RecordingProtocol, device: Device, done: list[Take], on_progress: Callable[[float], None]
+    protocol: RecordingProtocol, device: Device, done: list[PlayedPiece], on_progress: Callable[[float], None]
 ) -> None:
     """Play the whole protocol, appending each finished piece to `done`. `on_progress(seconds)` steps back where a piece
     is repeated. A lowered amplitude is kept for later rounds of the same segment.
@@ -58,7 +58,7 @@ def play_pieces(
     for piece in pieces(protocol, device.info.sample_rate_hz):
         length_s, started_s = piece.commands.duration_s, before_s
         same = (piece.number, piece.frequency_hz)
-        take = _take(
+        take = _play_until_clean(
             protocol,
             device,
             piece,
@@ -71,36 +71,36 @@ def play_pieces(
         on_progress(before_s)
 
 
-def _take(
+def _play_until_clean(
     protocol: RecordingProtocol, device: Device, piece: Piece, share: float, on_share: Callable[[float], None]
-) -> Take:
+) -> PlayedPiece:
     """The first clean take, or the last one."""
     requested_n = piece.segment.amplitude
     least_n = min(protocol.least_amplitude_n, requested_n)
     amplitude_n, sensor_before, total_before = share * requested_n, 0, 0
     for tries in range(1, MOST_TRIES + 1):
         played = piece if amplitude_n == requested_n else piece.at(amplitude_n)
-        recording, health = _once(device, played, on_share)
+        recording, health = _play_once(device, played, on_share)
         last = tries == MOST_TRIES or amplitude_n <= least_n or not protocol.lower_on_clip
         if last or not is_clipped(health):
             break
         sensor_before += health.sensor_clipped
         total_before += health.total_clipped + health.feedback_clipped
         amplitude_n = max(LOWERED_TO * amplitude_n, least_n)
-    return Take(played, requested_n, tries, sensor_before, total_before, recording, health)
+    return PlayedPiece(played, requested_n, tries, sensor_before, total_before, recording, health)
 
 
-def _once(device: Device, piece: Piece, on_share: Callable[[float], None]) -> tuple[Recording, Health]:
+def _play_once(device: Device, piece: Piece, on_share: Callable[[float], None]) -> tuple[Recording, Health]:
     played = device.play(piece.commands, on_share)
     if played.recording is None or played.health.fault is not Fault.NONE:
         raise DeviceError(
             "The device let go",
-            f"While recording along {along_in_words(piece)}: {played.health.fault.value}.",
+            f"While recording along {direction_text(piece)}: {played.health.fault.value}.",
             "Check the device and record again.",
         )
     return played.recording, played.health
 
 
-def along_in_words(piece: Piece) -> str:
+def direction_text(piece: Piece) -> str:
     """The direction of a piece for a sentence: an axis, or "all axes"."""
     return "all axes" if piece.along == "all" else piece.along

@@ -19,10 +19,11 @@ from study.session.views.handle_notice import BeforeMoving, handle_notice, refus
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import write_recording
 from study.workflows.free_name import require_free
-from study.workflows.recording.play_pieces import Take, play_pieces
+from study.workflows.recording.play_pieces import PlayedPiece, play_pieces
 from study.workflows.recording.take_facts import segment_facts, spring_facts, warnings_of
 
 NOMINAL_RATE_HZ = 1000.0
+"""Rate for which durations are stated before a device is open (Hz)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ def record_on(
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
     """Record on an open device."""
-    done: list[Take] = []
+    done: list[PlayedPiece] = []
     try:
         if not device.info.simulated:
             before_moving(handle_notice(plan.protocol, device.info.name, plan.total_s))
@@ -82,7 +83,7 @@ def record_on(
         _write_whole_pieces(plan, device, done)
         if device.fault() is Fault.FORCE_LEFT:
             raise _still_on(plan, len(done)) from interruption
-        raise _left(plan, len(done)) from interruption
+        raise _interrupted_error(plan, len(done)) from interruption
     except DeviceError as error:
         _write_whole_pieces(plan, device, done)
         error.saved = _saved_words(plan, len(done))
@@ -95,7 +96,7 @@ def check_free(out: Path) -> None:
     require_free(out, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
-def _left(plan: RecordingPlan, done: int) -> UserInterruptError:
+def _interrupted_error(plan: RecordingPlan, done: int) -> UserInterruptError:
     all_pieces = len(pieces(plan.protocol, NOMINAL_RATE_HZ))
     return UserInterruptError(
         "Interrupted",
@@ -115,7 +116,7 @@ def _saved_words(plan: RecordingPlan, done: int) -> str:
     return f"The {done} whole pieces are in {plan.out}." if done else "Nothing was written."
 
 
-def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[Take]) -> None:
+def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[PlayedPiece]) -> None:
     if done:
         _write(plan, device, done, interrupted=True)
 
@@ -132,13 +133,13 @@ def recording_settings(plan: RecordingPlan) -> DeviceSettings:
     )
 
 
-def _write(plan: RecordingPlan, device: Device, done: list[Take], interrupted: bool) -> WrittenRecording:
+def _write(plan: RecordingPlan, device: Device, done: list[PlayedPiece], interrupted: bool) -> WrittenRecording:
     parts = [replace(take.recording, segments=(take.piece.segment,)) for take in done]
     write_recording(plan.out, join(parts, _meta(plan, device, done, interrupted)))
     return WrittenRecording(plan.out, tuple(warning for take in done for warning in warnings_of(take)))
 
 
-def _meta(plan: RecordingPlan, device: Device, done: list[Take], interrupted: bool) -> dict[str, Any]:
+def _meta(plan: RecordingPlan, device: Device, done: list[PlayedPiece], interrupted: bool) -> dict[str, Any]:
     protocol = plan.protocol
     return {
         "protocol": protocol.name,

@@ -6,7 +6,7 @@ from typing import Any
 
 from protocols.definition.apparatus import SpringSettings
 from study.session.facts.sensor_facts import SensorFacts
-from study.workflows.recording.play_pieces import Take, along_in_words
+from study.workflows.recording.play_pieces import PlayedPiece, direction_text
 
 
 def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, Any]:
@@ -20,7 +20,7 @@ def spring_facts(spring: SpringSettings, effective_mass_kg: float) -> dict[str, 
     }
 
 
-def segment_facts(take: Take) -> dict[str, Any]:
+def segment_facts(take: PlayedPiece) -> dict[str, Any]:
     """Metadata of one piece."""
     piece = take.piece
     return {
@@ -39,9 +39,9 @@ def segment_facts(take: Take) -> dict[str, Any]:
     }
 
 
-def warnings_of(take: Take) -> list[str]:
+def warnings_of(take: PlayedPiece) -> list[str]:
     """Warnings for the person who recorded."""
-    health, what = take.health, _what(take)
+    health, what = take.health, _piece_text(take)
     found = []
     if take.played_n < take.requested_n:
         found.append(_reduction_warning(take))
@@ -65,17 +65,17 @@ def _sensor_warning(sensor: SensorFacts, what: str) -> str:
     return f"{packets} ({what}); at {sensor.unplaced_ticks} of {sensor.ticks} ticks its acceleration is NaN."
 
 
-def _what(take: Take) -> str:
+def _piece_text(take: PlayedPiece) -> str:
     piece = take.piece
     kind = f"{piece.frequency_hz:g} Hz" if piece.frequency_hz else piece.segment.kind
-    return f"{kind} along {along_in_words(piece)}"
+    return f"{kind} along {direction_text(piece)}"
 
 
-def _reduction_warning(take: Take) -> str:
+def _reduction_warning(take: PlayedPiece) -> str:
     why = []
     if take.sensor_clipped_before:
         why.append(f"the accelerometer clipped in {take.sensor_clipped_before} samples")
     if take.total_clipped_before:
         why.append(f"the force was at its cap for {take.total_clipped_before} ticks")
     reason = " and ".join(why) if why else "as before"
-    return f"Played at {take.played_n:.3g} N instead of {take.requested_n:.3g} N ({_what(take)}): {reason}."
+    return f"Played at {take.played_n:.3g} N instead of {take.requested_n:.3g} N ({_piece_text(take)}): {reason}."

@@ -28,7 +28,7 @@ from study.store.sessions.written_elsewhere import note_written
 from study.workflows.picture_files import write_pictures
 from study.workflows.results.analysis_files import PAGE_NAME, analysis_outputs
 from study.workflows.results.collect_sessions import collect_sessions
-from study.workflows.results.collected import Collected
+from study.workflows.results.collected import CollectedTrials
 from study.workflows.results.export_study import collect_exported, is_exported
 from study.workflows.results.written_analysis import WrittenAnalysis
 
@@ -145,7 +145,7 @@ def _write(
     pictures: tuple[Picture, ...],
     shapes: tuple[EllipsoidResult, ...],
     provenance: Provenance,
-    collected: Collected,
+    collected: CollectedTrials,
 ) -> None:
     figures = out / "figures"
     try:
@@ -170,7 +170,7 @@ def _write(
     write_text(out / PAGE_NAME, page, overwrite=True)
 
 
-def _shown(provenance: Provenance, collected: Collected) -> dict[str, str]:
+def _shown(provenance: Provenance, collected: CollectedTrials) -> dict[str, str]:
     """Entries of the report's last section."""
     return {
         "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",

@@ -14,12 +14,12 @@ from study.session.views.archive_views import TURNED_AWAY
 from study.store.formats.answer_table import ASKED, FilledForm
 from study.store.sessions.archive import SessionFolder, session_folders
 from study.store.sessions.event_log import LOG_NAME
-from study.workflows.results.collected import Collected
+from study.workflows.results.collected import CollectedTrials
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import finish_tables
 
 
-def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
+def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedTrials:
     """Matching sessions below `data` (or `data` itself, a session).
 
     Of several protocols the named one, else the one with most sessions; people before simulated participants before
@@ -45,7 +45,7 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> Collected:
     trials = parts[kind] if kind is not None else ()
     names = {trial.session for trial in trials}
     entering = [(folder, state) for folder, state in chosen if folder.name in names]
-    return Collected(
+    return CollectedTrials(
         protocol=chosen[0][1].protocol,
         protocol_hash=chosen_hash,
         trials=trials,

@@ -10,7 +10,7 @@ from study.store.sessions.archive import SessionFolder
 
 
 @dataclass(frozen=True, slots=True)
-class Collected:
+class CollectedTrials:
     """Trials that are analysed together, all of the same protocol, and facts about their sessions."""
 
     protocol: StudyProtocol

@@ -19,7 +19,7 @@ from study.store.formats.psych_ds import KIND, PROTOCOL_NAME, is_psych_ds, read_
 from study.store.formats.trials_mat import write_trials_mat
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.written_elsewhere import note_written
-from study.workflows.results.collected import Collected
+from study.workflows.results.collected import CollectedTrials
 
 Form = Literal["psych-ds", "bids", "mat", "csv"]
 WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
@@ -42,7 +42,7 @@ class Exported:
     """What was excluded, and why, in sentences."""
 
 
-def export_study(collected: Collected, data: Path, out: Path, form: Form, free_text: bool = False) -> Exported:
+def export_study(collected: CollectedTrials, data: Path, out: Path, form: Form, free_text: bool = False) -> Exported:
     """Write the dataset atomically. collected: the sessions of `data` that belong together. free_text: with what
     participants wrote in their own words. Raises StudyError."""
     require_new_folder(out)
@@ -56,7 +56,7 @@ def export_study(collected: Collected, data: Path, out: Path, form: Form, free_t
     return Exported(out, names, len(collected.trials), collected.left_out)
 
 
-def _facts(collected: Collected) -> dict[str, Any]:
+def _facts(collected: CollectedTrials) -> dict[str, Any]:
     names = [folder.name for folder in collected.sessions]
     return {
         **gather_provenance(protocol_hash=collected.protocol_hash).as_dict(),
@@ -73,7 +73,7 @@ def is_exported(folder: Path) -> bool:
     return is_psych_ds(folder) or tidy_csv.is_tidy_csv(folder)
 
 
-def collect_exported(folder: Path) -> Collected:
+def collect_exported(folder: Path) -> CollectedTrials:
     """Read a dataset of `export_study` that `is_exported`: the same trials and protocol give the same results.
     Raises StudyError."""
     psych_ds = is_psych_ds(folder)
@@ -87,7 +87,7 @@ def collect_exported(folder: Path) -> Collected:
         raise UnusableFileError(path, kind, ("it is no protocol of a study",))
     seeds = found.facts.get("seeds", {})
     sessions = tuple(dict.fromkeys(trial.session for trial in found.trials))
-    return Collected(
+    return CollectedTrials(
         protocol=protocol,
         protocol_hash=protocol_hash(protocol),
         trials=found.trials,

@@ -9,8 +9,8 @@ from analysis.device_change.probe_lines import probe_lines
 from equalizer.signals.recording import Recording
 from protocols.definition.probes import PERIOD_S
 from study.errors import StudyError
+from study.session.watching.followed_session import PlayedProbe
 from study.session.watching.watch_view import DriftLine
-from study.session.watching.watched import PlayedProbe
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import SessionFolder
 
@@ -49,10 +49,10 @@ class DriftReader:
     def look(self, probes: tuple[PlayedProbe, ...]) -> tuple[DriftLine, ...]:
         """Present drifts: of device and hand together, in this sitting; of the device alone, between references."""
         for probe in probes[self._seen :]:
-            read = self._take(probe)
+            read = self._read_probe(probe)
             if read is not None and probe.kind in ("hand", "reference"):
                 self._read.append((probe, read))
-                self._found[probe.kind] = tuple(self._say(probe.kind, self._compare(probe)))
+                self._found[probe.kind] = tuple(self._drift_lines(probe.kind, self._compare(probe)))
         self._seen = len(probes)
         return tuple(line for lines in self._found.values() for line in lines)
 
@@ -66,7 +66,7 @@ class DriftReader:
         alike = [read for probe, read in self._read if (probe.kind, probe.sitting) == ("hand", newest.sitting)]
         return drifts([timed for read in alike for timed in read.timed], _period(alike[-1]))
 
-    def _say(self, kind: str, found: tuple[Drift, ...]) -> Iterator[DriftLine]:
+    def _drift_lines(self, kind: str, found: tuple[Drift, ...]) -> Iterator[DriftLine]:
         named = {(kind, drift.number, drift.axis): drift for drift in found}
         # A drift that has disappeared has no beginning any more.
         self._since_s = {key: s for key, s in self._since_s.items() if key[0] != kind or key in named}
@@ -75,7 +75,7 @@ class DriftReader:
             words = sentence(replace(drift, at_s=since_s))
             yield DriftLine(since_s, f"without a hand, {words}" if kind == "reference" else words, is_beyond(drift))
 
-    def _take(self, probe: PlayedProbe) -> _Read | None:
+    def _read_probe(self, probe: PlayedProbe) -> _Read | None:
         """Read a probe's recording; None where nothing was kept, or it cannot be used."""
         if not probe.recording or probe.trouble:
             return None

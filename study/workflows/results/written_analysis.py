@@ -1,4 +1,4 @@
-"""What an analysis leaves behind, as a value for screen and command line."""
+"""Result of an analysis, with the files it wrote, as a value for screen and command line."""
 
 from dataclasses import dataclass
 from pathlib import Path

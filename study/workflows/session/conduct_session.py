@@ -54,7 +54,7 @@ class Participant:
 
 
 @dataclass(frozen=True, slots=True)
-class Conducted:
+class ConductedSitting:
     """How a sitting ended: the session's state, and why it was left."""
 
     folder: SessionFolder
@@ -69,7 +69,7 @@ class Conducted:
     """The participant withdrew consent: the caller erases the data."""
 
 
-def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> Conducted:
+def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> ConductedSitting:
     """Open the device, then a new session, and run it."""
     check_playable(plan.protocol, plan.model)
     settings = device_settings(plan.protocol)
@@ -81,10 +81,10 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
         _check_sensor(plan.protocol, device.info)
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
         with open_session(plan, device.info, equalized, participant.clock) as opened:
-            return _run(opened, At(device, equalized, pulse, sound), participant)
+            return _run(opened, Equipment(device, equalized, pulse, sound), participant)
 
 
-def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> Conducted:
+def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> ConductedSitting:
     """Fold the log, open the device, and continue the session."""
     state = fold_session(folder).state
     if state.opened.equalized is not None:
@@ -99,7 +99,7 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
         equalized = reload_equalizer(folder, state, device.info)
         with resume_session(folder, device.info, participant.clock) as opened:
             known_steps = len(state.sitting.clock_steps)
-            return _run(opened, At(device, equalized, pulse, sound), participant, known_steps)
+            return _run(opened, Equipment(device, equalized, pulse, sound), participant, known_steps)
 
 
 def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
@@ -124,8 +124,8 @@ def _pulses(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
 
 
 @dataclass(frozen=True, slots=True)
-class At:
-    """Current activity of the participant."""
+class Equipment:
+    """The device of a sitting, what equalizes its stimuli, the pulse line, and the masking noise."""
 
     device: Device
     equalized: Equalized
@@ -133,9 +133,11 @@ class At:
     sound: Sound | None
 
 
-def _run(opened: OpenedSession, at: At, participant: Participant, known_steps: int = 0) -> Conducted:
+def _run(
+    opened: OpenedSession, equipment: Equipment, participant: Participant, known_steps: int = 0
+) -> ConductedSitting:
     """Run the session. known_steps: clock steps before this sitting; only new ones are reported."""
-    folder, protocol, device = opened.folder, opened.state.protocol, at.device
+    folder, protocol, device = opened.folder, opened.state.protocol, equipment.device
     participant.on_opened(folder, device)
     place_m = device_settings(protocol).place_m
     inbox = RequestInbox(folder.path)
@@ -152,16 +154,16 @@ def _run(opened: OpenedSession, at: At, participant: Participant, known_steps: i
         log=opened.log,
         clock=participant.clock,
         device=device,
-        equalizer=at.equalized.equalizer,
+        equalizer=equipment.equalized.equalizer,
         display=participant.display,
         hand=participant.hand,
         supervisor=supervisor,
         place_m=place_m,
-        pulse=at.pulse,
-        sound=at.sound,
+        pulse=equipment.pulse,
+        sound=equipment.sound,
     )
     tell_clock_steps(opened.state.sitting.clock_steps[known_steps:], sitting)
     for name in opened.state.sitting.not_counted:
         tell(f"{name} cannot be read: what the hand got in it is not in the vibration dose of today.", sitting)
     end = run_session(opened.state, sitting)
-    return Conducted(folder, end.state, end.left, end.fault, end.why, end.withdrawn)
+    return ConductedSitting(folder, end.state, end.left, end.fault, end.why, end.withdrawn)

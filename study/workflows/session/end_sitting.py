@@ -5,17 +5,17 @@ from dataclasses import replace
 from study.devices.device import Fault
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.void_reasons import TOO_BUSY
-from study.session.views.counted import answers_are
+from study.session.views.count_text import answers_are
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.analysis_files import ANALYSIS_NAME, is_analysis_of
 from study.workflows.results.fold_session import FoldedSession
 from study.workflows.results.session_results import REPORT_NAME, due_results, finish_tables, write_results, write_tables
 from study.workflows.results.written_analysis import WrittenAnalysis
-from study.workflows.session.conduct_session import Conducted
+from study.workflows.session.conduct_session import ConductedSitting
 from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.session.resume_session import already_finished
-from study.workflows.session.withdraw_participant import plan_withdrawal, still_elsewhere, withdraw
+from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
 
 DEVICE_ADVICE = "Run hapteq doctor --device NAME, which says what is wrong with it, and mend that. "
 OF_THE_DEVICE = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
@@ -24,7 +24,7 @@ OF_THE_DEVICE = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LO
 BUSY_ADVICE = "Close other programs, and measure with hapteq doctor whether that helps. "
 
 
-def end_sitting(end: Conducted, utc: str) -> WrittenAnalysis:
+def end_sitting(end: ConductedSitting, utc: str) -> WrittenAnalysis:
     """Write the results, or erase what a participant withdrew. Raises StudyError for an unfinished session, with how
     to continue and an exit code that says why it ended."""
     if end.withdrawn:
@@ -53,7 +53,7 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
     return replace(written, warnings=(text, *written.warnings))
 
 
-def _not_finished(end: Conducted) -> StudyError:
+def _not_finished(end: ConductedSitting) -> StudyError:
     kind = UserInterruptError if end.fault is Fault.NONE else DeviceError
     advice = DEVICE_ADVICE if end.fault in OF_THE_DEVICE else ""
     return kind(
@@ -64,9 +64,9 @@ def _not_finished(end: Conducted) -> StudyError:
     )
 
 
-def _erase(end: Conducted, utc: str) -> StudyError:
+def _erase(end: ConductedSitting, utc: str) -> StudyError:
     data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
-    elsewhere = still_elsewhere(data, plan)
+    elsewhere = copies_elsewhere(data, plan)
     withdraw(data, plan, utc)
     return UserInterruptError(
         "The participant withdrew",

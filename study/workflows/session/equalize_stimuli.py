@@ -27,11 +27,12 @@ from study.workflows.equalizer.spring_not_in_model import spring_outside_model
 
 MODEL_NAME = "model.h5"
 NEAR_M = 0.02
-"""Largest distance from the place of identification: farther away, the published coupling returns."""
+"""Largest distance (m) from the place of identification: farther away, coupling between the axes grows back to what was
+published without an equalizer."""
 
 AXES = (("fx", "fy", "fz"), ("ax", "ay", "az"))
 IDENTIFY_AGAIN = "Identify it again with hapteq identify."
-LEFT_OUT = 0.1
+LARGEST_ERROR = 0.1
 """Largest relative error of a stimulus by the model itself; beyond it a level would not have its meaning."""
 
 
@@ -49,15 +50,15 @@ NOT_EQUALIZED = Equalized(Identity(), None)
 
 
 def check_playable(protocol: StudyProtocol, model: Path | None) -> None:
-    """Raise StudyError where protocol and model do not go together, before any device is opened."""
-    wants_one = protocol.stimulus.quantity == "delivered_acceleration"
-    if wants_one and model is None:
+    """Raise StudyError where protocol and model do not fit each other, before any device is opened."""
+    needs_model = protocol.stimulus.quantity == "delivered_acceleration"
+    if needs_model and model is None:
         raise StudyError(
             "This protocol needs an equalizer",
             f"'{protocol.name}' moves the delivered acceleration (stimulus.quantity), and no model was given.",
             "Give one with --model MODEL.h5; hapteq record and hapteq identify make it.",
         )
-    if model is not None and not wants_one:
+    if model is not None and not needs_model:
         raise StudyError(
             "This protocol does not use a model",
             f"'{protocol.name}' moves the commanded force (stimulus.quantity), so {model} would change nothing.",
@@ -197,7 +198,7 @@ def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) ->
     with np.errstate(all="ignore"):
         reached = model_response(model, frequency_hz) @ inverse_response(model, frequency_hz) @ wanted
         left_out = np.linalg.norm(reached - wanted, axis=1).max(axis=1)
-    beyond = [f"{f:g}" for f, share in zip(frequency_hz, left_out, strict=True) if not share <= LEFT_OUT]
+    beyond = [f"{f:g}" for f, share in zip(frequency_hz, left_out, strict=True) if not share <= LARGEST_ERROR]
     if beyond:
         raise _refusal(
             f"By {path} itself, no reasonable force gives the wanted acceleration at {', '.join(beyond)} Hz.",

@@ -13,12 +13,12 @@ from study.session.state.state import SessionState
 from study.store.sessions.archive import SessionFolder, session_folders
 from study.store.sessions.event_log import read_opening
 from study.store.sessions.session_lock import hold_places_lock
-from study.store.sessions.withdrawal_files import Begun, read_begun, read_intent
+from study.store.sessions.withdrawal_files import SessionParticipant, read_begun, read_intent
 from study.workflows.trial.sitting import Sitting, record
 
 PLACED = b'"event":"place_taken"'
 NUMBER = re.compile(rb'"participant_number":(\d{1,6})\b')
-"""In the first line, and in that of the place; the last occurrence counts."""
+"""The number in a log: in its opening line, or in the event that replaces it; the last occurrence counts."""
 PROTOCOL_NAME = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
 OF_A_PERSON = b'"observer":null'
 PRESENTED = b'"event":"trial_presented"'
@@ -42,7 +42,7 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
     return max(numbers, default=-1) + 1
 
 
-def begun_in(folder: SessionFolder) -> Begun | None:
+def begun_in(folder: SessionFolder) -> SessionParticipant | None:
     """What a session folder says about its participant; None if nothing was begun or can be read."""
     if folder.tombstone.exists():
         return read_begun(folder)
@@ -56,10 +56,10 @@ def begun_in(folder: SessionFolder) -> Begun | None:
         name = tomllib.loads(opening.protocol_text).get("name", "")
     except (StudyError, OSError, TypeError, ValueError, RecursionError):
         return _begun_in_damaged(folder)
-    return Begun(name, opening.observer is not None, _place(folder, opening))
+    return SessionParticipant(name, opening.observer is not None, _read_place(folder, opening))
 
 
-def _begun_in_damaged(folder: SessionFolder) -> Begun | None:
+def _begun_in_damaged(folder: SessionFolder) -> SessionParticipant | None:
     """Read the place from a damaged log. Holding a place too long costs a row of the balanced order; giving it twice
     costs the balance."""
     try:
@@ -70,10 +70,10 @@ def _begun_in_damaged(folder: SessionFolder) -> Begun | None:
     name, numbers = PROTOCOL_NAME.search(opening), NUMBER.findall(content)
     if name is None or not numbers:
         return None
-    return Begun(name[1].decode(errors="replace"), OF_A_PERSON not in opening, int(numbers[-1]))
+    return SessionParticipant(name[1].decode(errors="replace"), OF_A_PERSON not in opening, int(numbers[-1]))
 
 
-def _place(folder: SessionFolder, opening: SessionOpened) -> int | None:
+def _read_place(folder: SessionFolder, opening: SessionOpened) -> int | None:
     """Read the place from the lines before the first trial, so that a long log is not read completely."""
     if not place_comes_later(opening):
         return opening.participant_number

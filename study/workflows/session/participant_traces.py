@@ -28,6 +28,7 @@ PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")
 LARGEST_BYTES = 1 << 24
 """Largest file that is searched for a name; recordings and pictures are not searched."""
 LONGEST_LINE = 1 << 20
+"""Bytes of a log's first line that are read."""
 TEXTS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".part")
 
 

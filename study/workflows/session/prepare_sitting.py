@@ -91,11 +91,11 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     daily = () if device.info.simulated else (last_check(device.info, state.protocol.setup.daily_check_needed),)
     report = replace(report, findings=(*report.findings, *computer, *daily))
     go_on = sitting.display.device_checked(report)
-    findings = tuple(f"{finding.name}: {finding.value}{_said(finding)}" for finding in report.findings)
+    findings = tuple(f"{finding.name}: {finding.value}{_finding_text(finding)}" for finding in report.findings)
     return record(state, DeviceChecked(utc=sitting.clock.utc(), passed=go_on, findings=findings), sitting)
 
 
-def _said(finding: DeviceFinding) -> str:
+def _finding_text(finding: DeviceFinding) -> str:
     if finding.fine:
         return ""
     return " (warning)" if finding.warning else " (not fine)"

@@ -18,10 +18,10 @@ from study.store.disk.new_folder import new_folder
 from study.store.disk.privacy import make_folder
 from study.store.disk.provenance import sha256_of
 from study.store.sessions.archive import SessionFolder, session_folders
-from study.workflows.pieces import finished_pieces
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
-from study.workflows.session.conduct_session import Conducted, conduct_new, conduct_resumed
+from study.workflows.run_on_executor import finished_pieces
+from study.workflows.session.conduct_session import ConductedSitting, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import create_participant
 from study.workflows.worker_processes import worker_processes
@@ -69,7 +69,7 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
             return
         every = ((number, (rehearsal, number)) for number in range(rehearsal.subjects))
         with worker_processes(workers) as pool:
-            for done, _ in enumerate(finished_pieces(pool, _sit, every), start=1):
+            for done, _ in enumerate(finished_pieces(pool, _rehearse_sitting, every), start=1):
                 on_finished(done)
 
 
@@ -80,7 +80,7 @@ def _rehearse_elsewhere(rehearsal: Rehearsal, executor: Executor, on_finished: C
     model = {} if rehearsal.model is None else read_file(rehearsal.model)
     left = [number for number in range(rehearsal.subjects) if number not in begun]
     for done, number in enumerate(sorted(begun), start=1):
-        _sit(rehearsal, number)
+        _rehearse_sitting(rehearsal, number)
         on_finished(done)
     played = finished_pieces(executor, play_apart, ((each, (rehearsal, model, each)) for each in left))
     for done, (_, (session, files, why)) in enumerate(played, start=len(begun) + 1):
@@ -108,12 +108,12 @@ def subject_seed(seed: int, number: int) -> int:
     return int(SeedSequence(seed, spawn_key=(number,)).generate_state(1)[0])
 
 
-def _sit(rehearsal: Rehearsal, number: int) -> None:
+def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
     observer = rehearsed_observer(rehearsal, number)
     seed = subject_seed(rehearsal.seed, number)
     if any(f.withdrawn for f in session_folders(rehearsal.data) if f.subject == subject_code(number)):
         return
-    begun = _begun(rehearsal.data, subject_code(number))
+    begun = _find_begun(rehearsal.data, subject_code(number))
     if begun is None:
         conducted = _play_new(rehearsal, number)
     elif (folded := fold_session(begun)).state.closed:
@@ -137,7 +137,7 @@ def play_apart(rehearsal: Rehearsal, model: Files, number: int) -> tuple[str, Fi
         return conducted.folder.name, read_files(conducted.folder.path), conducted.left
 
 
-def _play_new(rehearsal: Rehearsal, number: int) -> Conducted:
+def _play_new(rehearsal: Rehearsal, number: int) -> ConductedSitting:
     observer, seed = rehearsed_observer(rehearsal, number), subject_seed(rehearsal.seed, number)
     plan = SessionPlan(
         protocol=rehearsal.protocol,
@@ -163,7 +163,7 @@ def _require_finished(session: str, why: str) -> None:
         )
 
 
-def _begun(data: Path, subject: str) -> SessionFolder | None:
+def _find_begun(data: Path, subject: str) -> SessionFolder | None:
     """The participant's last session with a first line; a crash at the start leaves an empty folder."""
     folders = [f for f in session_folders(data) if f.subject == subject and f.log.exists() and f.log.stat().st_size]
     return folders[-1] if folders else None
@@ -180,7 +180,7 @@ def _check_same(rehearsal: Rehearsal) -> None:
         )
     model = sha256_of(rehearsal.model) if rehearsal.model is not None and rehearsal.model.is_file() else None
     for number in range(rehearsal.subjects):
-        folder = _begun(rehearsal.data, subject_code(number))
+        folder = _find_begun(rehearsal.data, subject_code(number))
         if folder is None:
             continue
         opened = fold_session(folder).state.opened

@@ -24,7 +24,7 @@ from study.session.state.fold import apply
 from study.session.state.state import SessionState
 from study.session.stimulus.delivered import measure_delivered
 from study.session.stimulus.stimulus import direction_vector
-from study.session.views.counted import answers_are
+from study.session.views.count_text import answers_are
 from study.store.disk.privacy import close_data_folder, close_to_others
 from study.store.disk.provenance import versions
 from study.store.sessions.archive import SessionFolder

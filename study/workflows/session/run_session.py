@@ -15,7 +15,7 @@ from study.session.state.probing import Probe, Reference
 from study.session.state.progress import progress
 from study.session.state.state import SessionState, felt
 from study.session.views.archive_views import TURNED_AWAY
-from study.session.views.counted import answers_are
+from study.session.views.count_text import answers_are
 from study.session.views.views import Goodbye, PracticeResult, RestNotice, Welcome, picture_of
 from study.store.sessions.log_seal import seal_log
 from study.workflows.results.fold_session import fold_session
@@ -56,7 +56,7 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     StudyError is extended by the number of saved answers and how to continue.
     """
     try:
-        end = _sit(state, sitting)
+        end = _run_sitting(state, sitting)
     except KeyboardInterrupt as interruption:
         sitting.device.stop()
         return _end_interrupted(sitting, interruption)
@@ -77,16 +77,16 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     return end
 
 
-def _sit(state: SessionState, sitting: Sitting) -> SessionEnd:
+def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
     state, refused = prepare_sitting(state, sitting)
     if state.turned_away_for_good:
         return SessionEnd(turn_away(state, sitting), refused)
     if refused:
-        return _end(AfterTrial(state, leave=refused), sitting)
+        return _end_sitting(AfterTrial(state, leave=refused), sitting)
     state = start_masking(take_place(state, sitting), sitting)
     sitting.supervisor.begin("instructions")
     sitting.display.welcome(_welcome(state, sitting))
-    return _loop(state, sitting)
+    return _run_actions(state, sitting)
 
 
 def _end_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
@@ -124,7 +124,7 @@ def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
     return error
 
 
-def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
+def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
     voids: tuple[str, ...] = ()
     while True:
         state = write_notes(state, sitting)
@@ -147,11 +147,11 @@ def _loop(state: SessionState, sitting: Sitting) -> SessionEnd:
             state = start_masking(broken.state, sitting) if goes_on else broken.state
             after = replace(after, state=state, leave=broken.leave)
             if broken.withdrawn:
-                return replace(_end(after, sitting), withdrawn=True)
+                return replace(_end_sitting(after, sitting), withdrawn=True)
         if stopped := sitting.supervisor.stop_asked:
             after = replace(after, leave=after.leave or f"the {stopped} stopped the session")
         if after.leave:
-            return _end(after, sitting)
+            return _end_sitting(after, sitting)
         state = after.state
 
 
@@ -160,7 +160,7 @@ def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
         case Leave(reason=reason):
             return AfterTrial(state, leave=reason)
         case Rest(seconds=seconds):
-            return AfterTrial(_rest(state, seconds, sitting))
+            return AfterTrial(_take_rest(state, seconds, sitting))
         case FillIn(form=form):
             return AfterTrial(fill_in(state, form, sitting))
         case Demonstrate():
@@ -180,7 +180,7 @@ def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
             return AfterTrial(state)
 
 
-def _end(after: AfterTrial, sitting: Sitting) -> SessionEnd:
+def _end_sitting(after: AfterTrial, sitting: Sitting) -> SessionEnd:
     state = stop_masking(_say_busy(write_notes(after.state, sitting), sitting), sitting)
     left = SessionInterrupted(utc=sitting.clock.utc(), reason=after.leave)
     why = sitting.device.health().why if after.fault is not Fault.NONE else ""
@@ -218,7 +218,7 @@ def _practice_result(before: SessionState, correct: bool) -> PracticeResult:
     return PracticeResult(practice_passed(settings, done), right_of_last(settings, done), asked)
 
 
-def _rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
+def _take_rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
     """A rest cut short by a pause or stop does not count and is due again."""
     sitting.supervisor.begin("rest")
     notice = RestNotice(seconds, len(state.runs) - state.run, progress(state))

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from protocols.trial import Phase, VoidCause
 from study.devices.clock import Clock
-from study.participants.observer import Felt, Observer
+from study.participants.observer import Observer, PerceivedStimulus
 from study.session.state.due_trial import Present
 from study.session.views.form_views import Form, FormField, FormReply
 from study.session.views.views import (
@@ -55,12 +55,12 @@ class SimulatedDisplay:
         self._clock = clock
         self._on_question = on_question
         self._touch = touch
-        self._felt: Felt | None = None
+        self._felt: PerceivedStimulus | None = None
         self._stimulus: Present | None = None
 
     def feel(self, stimulus: Present, answers_before: int) -> None:
         self._stimulus = stimulus
-        self._felt = Felt(
+        self._felt = PerceivedStimulus(
             run=stimulus.run,
             trial=stimulus.trial,
             attempt=stimulus.attempt,
@@ -114,7 +114,9 @@ class SimulatedDisplay:
             return Unanswered("asked to repeat", leave=False, asked=True)
         return Answered(reply.answer, self._clock.now_s())
 
-    def _wait_and_feel(self, felt: Felt, seconds: float, sign_of_life: SignOfLife) -> Felt | None:
+    def _wait_and_feel(
+        self, felt: PerceivedStimulus, seconds: float, sign_of_life: SignOfLife
+    ) -> PerceivedStimulus | None:
         """Wait and return what is felt; None where the sign of life ended the wait. A detection trial is over when the
         question comes."""
         touch, stimulus = self._touch, self._stimulus

@@ -16,7 +16,7 @@ from study.store.disk.real_folder import RealFolder, is_real_file, is_real_folde
 from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder, withdrawal_file
 from study.store.sessions.event_log import LOG_NAME, hold_log_lock
 from study.store.sessions.session_lock import LOCK_NAME, hold_session_lock
-from study.store.sessions.withdrawal_files import Intent, read_intent, write_intent, write_tombstone
+from study.store.sessions.withdrawal_files import WithdrawalIntent, read_intent, write_intent, write_tombstone
 from study.store.sessions.written_elsewhere import folders_written_elsewhere
 from study.workflows.session.participant_number import begun_in
 from study.workflows.session.participant_traces import analysis_names, find_traces
@@ -88,11 +88,11 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
     try:
         with ExitStack() as held, open_folder(data) as place:
             for folder in folders:
-                _hold(folder, held)
+                _lock_for_erasing(folder, held)
             earlier = read_intent(data, subject)
             begun = {folder.name: begun_in(folder) for folder in folders}
             since = earlier.withdrawn_utc if earlier else utc
-            write_intent(data, Intent(subject, since, begun, withdrawal.derived))
+            write_intent(data, WithdrawalIntent(subject, since, begun, withdrawal.derived))
             for name in withdrawal.derived:
                 _erase_derived(place, name)
             for folder in folders:
@@ -105,14 +105,14 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
         raise _not_everything(data, withdrawal, problem) from problem
 
 
-def still_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
+def copies_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
     """Sentences on copies outside the data folder that were noted when they were written."""
     noted = [path for path in folders_written_elsewhere(data) if path.exists()]
     named = [path for path in noted if analysis_names(path, withdrawal.subject) is not False]
     return (*(f"Written with --out, and not erased: {path}" for path in named), ELSEWHERE)
 
 
-def _hold(folder: SessionFolder, held: ExitStack) -> None:
+def _lock_for_erasing(folder: SessionFolder, held: ExitStack) -> None:
     """Lock the session while it is erased. A link in its place is not followed."""
     if not is_real_folder(folder.path):
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)

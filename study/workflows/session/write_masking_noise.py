@@ -9,6 +9,7 @@ from study.store.disk.file_errors import AlreadyThereError
 from study.store.disk.wav_file import write_wav
 
 SAMPLE_RATE_HZ = 44_100
+"""Sample rate of the file, that of audio CDs (Hz)."""
 
 HOW_TO_USE = (
     "Play it in a loop, without a gap, from before the demonstration until after the last trial: it repeats without "

@@ -14,7 +14,7 @@ from study.workflows.trial.sitting import Pulse, Sitting, release_device
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Asked:
+class StimulusReply:
     """The reply to one stimulus and the state of the device at that moment."""
 
     reply: Reply
@@ -33,7 +33,7 @@ class Asked:
     """Pulse at the onset of the force; None where the lab has no line for it, or the force did not begin."""
 
 
-def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
+def ask_participant(state: SessionState, present: Present, question: Question, sitting: Sitting) -> StimulusReply:
     """Play the stimulus, ask, and return the reply."""
     sitting.supervisor.begin("trial")
     if present.phase is Phase.DETECTION:
@@ -48,10 +48,12 @@ def ask_participant(state: SessionState, present: Present, question: Question, s
     sitting.device.keep_alive()
     health = sitting.device.health()
     whole = health.fault is Fault.NONE
-    return Asked(reply, started_s, whole, played=None, holding=True, health=health, pulse=pulse)
+    return StimulusReply(reply, started_s, whole, played=None, holding=True, health=health, pulse=pulse)
 
 
-def _in_one_of_two_intervals(state: SessionState, present: Present, question: Question, sitting: Sitting) -> Asked:
+def _in_one_of_two_intervals(
+    state: SessionState, present: Present, question: Question, sitting: Sitting
+) -> StimulusReply:
     played: Played | None = None
     pulse: Pulse | None = None
     sitting.hand.feel(present, state.answers)
@@ -62,17 +64,17 @@ def _in_one_of_two_intervals(state: SessionState, present: Present, question: Qu
             pulse = sitting.pulse()
         cut = _wait(f"Interval {interval}", interval, state.protocol.detection.interval_s, sitting)
         if cut is not None:
-            return Asked(cut, sitting.clock.now_s(), False, played, holding, pulse=pulse)
+            return StimulusReply(cut, sitting.clock.now_s(), False, played, holding, pulse=pulse)
         if holding:
             played = release_device(sitting)
         cut = _wait("", 0, state.protocol.detection.gap_s, sitting) if interval == 1 else None
         if cut is not None:
-            return Asked(cut, sitting.clock.now_s(), False, played, holding=False, pulse=pulse)
+            return StimulusReply(cut, sitting.clock.now_s(), False, played, holding=False, pulse=pulse)
     started_s = sitting.clock.now_s()
     reply = _reply_to(question, sitting)
     health = played.health if played is not None else None
     whole = health is not None and health.fault is Fault.NONE
-    return Asked(reply, started_s, whole, played, holding=False, health=health, pulse=pulse)
+    return StimulusReply(reply, started_s, whole, played, holding=False, health=health, pulse=pulse)
 
 
 def _reply_to(question: Question, sitting: Sitting) -> Reply:

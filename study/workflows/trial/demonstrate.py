@@ -25,7 +25,7 @@ def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
         if isinstance(choice, DemoDone):
             return AfterTrial(record(state, DemoFinished(utc=sitting.clock.utc()), sitting))
         vibration = choice.vibration
-        after = _play(state, choice, sitting)
+        after = _play_demonstration(state, choice, sitting)
         state = after.state
         if after.leave or after.pause:
             return after
@@ -45,7 +45,7 @@ def _menu(state: SessionState, felt_so_far: tuple[tuple[int, int], ...], vibrati
     )
 
 
-def _play(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial:
+def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial:
     protocol = state.protocol
     frequency_hz = protocol.all_frequencies_hz[choice.vibration - 1]
     level_n = demo_level_n(protocol.demo, state.opened.seed, state.sitting.demos)

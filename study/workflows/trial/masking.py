@@ -33,7 +33,7 @@ def opened_sound(settings: MaskingSettings, clock: Clock, observer: str | None) 
 
 
 def start_masking(state: SessionState, sitting: Sitting) -> SessionState:
-    """Raises `DeviceError`."""
+    """Start the masking noise, and log it. Raises `DeviceError`."""
     if sitting.sound is None:
         return state
     sitting.sound.start()

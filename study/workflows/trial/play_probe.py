@@ -51,8 +51,8 @@ def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> AfterTria
         return cut_short(state, hindrance)
     if (ended := check_end_request(state, sitting)) is not None:
         return ended
-    measured = _hold(state, "hand", probe.level_n, sitting)
-    return _after(measured.state, measured.reply, measured.played, sitting)
+    measured = _play_and_measure(state, "hand", probe.level_n, sitting)
+    return _after_probe(measured.state, measured.reply, measured.played, sitting)
 
 
 def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
@@ -80,8 +80,8 @@ def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
 
 def _test_and_play(state: SessionState, held_kg: float, sitting: Sitting) -> AfterTrial:
     # At the level of the probe that it is compared with: the influence of friction and springs depends on the level.
-    test = _hold(state, "free", state.sitting.probing.hand_level_n, sitting)
-    after = _after(test.state, test.reply, test.played, sitting)
+    test = _play_and_measure(state, "free", state.sitting.probing.hand_level_n, sitting)
+    after = _after_probe(test.state, test.reply, test.played, sitting)
     if after.leave or after.pause or after.fault is not Fault.NONE:
         return after
     if test.mass_kg is None:
@@ -102,7 +102,7 @@ def _decline(state: SessionState, why: str, sitting: Sitting) -> SessionState:
 def _play_free(state: SessionState, sitting: Sitting) -> AfterTrial:
     probes, rate_hz = state.protocol.probes, sitting.device.info.sample_rate_hz
     commands, segments = reference_commands(probes, rate_hz)
-    state = _begin(state, "reference", probes.reference_n, sitting)
+    state = _log_played(state, "reference", probes.reference_n, sitting)
     sitting.supervisor.begin("reference")
     sitting.display.trouble(f"Hands off: the reference plays for {commands.duration_s:.0f} s.")
 
@@ -114,20 +114,20 @@ def _play_free(state: SessionState, sitting: Sitting) -> AfterTrial:
         played = sitting.device.play(commands, attend)
     except _EndedEarlyError:
         fault = sitting.device.fault()
-        state = _end(state, None, 0.0, "it was cut short", sitting).state
+        state = _log_measured(state, None, 0.0, "it was cut short", sitting).state
         reply = sitting.supervisor.resolve(Unanswered("the reference was cut short", leave=False, asked=True))
         after = cut_short(state, reply) if isinstance(reply, Unanswered) else AfterTrial(state)
         return replace(after, leave=after.leave or reason_to_leave(fault), fault=fault)
     kept = None if played.recording is None else replace(played.recording, segments=segments)
     trouble = "" if kept is not None else played.health.fault.value
-    state = _end(state, kept, commands.duration_s, trouble, sitting).state
+    state = _log_measured(state, kept, commands.duration_s, trouble, sitting).state
     return AfterTrial(state, leave=reason_to_leave(played.health.fault), fault=played.health.fault)
 
 
-def _hold(state: SessionState, kind: Kind, level_n: float, sitting: Sitting) -> _Measured:
+def _play_and_measure(state: SessionState, kind: Kind, level_n: float, sitting: Sitting) -> _Measured:
     """Log, play through the same port and under the same signs of life as a demonstration, and keep the recording."""
     stimulus = probe_stimulus(state.protocol.probes, level_n, sitting.device.info.sample_rate_hz)
-    state = _begin(state, kind, level_n, sitting)
+    state = _log_played(state, kind, level_n, sitting)
     sitting.supervisor.begin("probe")
     sitting.device.hold(stimulus)
     notice = PlayingNotice(NO_QUESTION, 0, HELD_S, picture=None)
@@ -138,16 +138,18 @@ def _hold(state: SessionState, kind: Kind, level_n: float, sitting: Sitting) -> 
     if not trouble and missed > state.protocol.measurement.missed_ticks_limit * max(played.health.ticks, 1):
         trouble = f"{missed} ticks of it were missed"
     seconds = played.health.ticks / sitting.device.info.sample_rate_hz
-    ended = _end(state, None if trouble else played.recording, seconds, trouble, sitting)
+    ended = _log_measured(state, None if trouble else played.recording, seconds, trouble, sitting)
     return replace(ended, reply=reply, played=played)
 
 
-def _begin(state: SessionState, kind: Kind, level_n: float, sitting: Sitting) -> SessionState:
+def _log_played(state: SessionState, kind: Kind, level_n: float, sitting: Sitting) -> SessionState:
     number = state.sitting.probing.played
     return record(state, ProbePlayed(sitting.clock.utc(), number, kind, level_n), sitting)
 
 
-def _end(state: SessionState, recording: Recording | None, seconds: float, trouble: str, sitting: Sitting) -> _Measured:
+def _log_measured(
+    state: SessionState, recording: Recording | None, seconds: float, trouble: str, sitting: Sitting
+) -> _Measured:
     """Save the recording, then log it."""
     probing = state.sitting.probing
     assert probing.open is not None, "a probe is measured after it was played"
@@ -196,7 +198,7 @@ def _conditions(probe: ProbePlayed, sitting: Sitting) -> dict[str, Any]:
     }
 
 
-def _after(state: SessionState, reply: Unanswered | None, played: Played, sitting: Sitting) -> AfterTrial:
+def _after_probe(state: SessionState, reply: Unanswered | None, played: Played, sitting: Sitting) -> AfterTrial:
     """A probe ends a sitting only where a trial would too: on request, or when the device is lost."""
     fault = played.health.fault
     if leave := reason_to_leave(fault):

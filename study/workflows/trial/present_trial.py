@@ -16,7 +16,7 @@ from study.session.stimulus.delivered import measure_delivered
 from study.session.stimulus.stimulus import AXES, direction_vector
 from study.session.views.views import HandleView, Question, Task, Unanswered, picture_of
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
-from study.workflows.trial.ask_participant import Asked, ask_participant
+from study.workflows.trial.ask_participant import StimulusReply, ask_participant
 from study.workflows.trial.judge_trial import cause_of, judge
 from study.workflows.trial.masking import was_masked
 from study.workflows.trial.sitting import Pulse, Sitting, record, release_device
@@ -139,7 +139,7 @@ def _log_pulse(state: SessionState, present: Present, pulse: Pulse, sitting: Sit
     return state
 
 
-def _close(state: SessionState, present: Present, played: Played, asked: Asked, sitting: Sitting) -> AfterTrial:
+def _close(state: SessionState, present: Present, played: Played, asked: StimulusReply, sitting: Sitting) -> AfterTrial:
     correct = state.answered is not None and state.answered.answer == present.label
     vector = direction_vector(state.protocol.directions, present.direction)
     verdict = judge(played.health, state.protocol.measurement, asked.felt_whole, asked.health)
@@ -155,7 +155,9 @@ def _close(state: SessionState, present: Present, played: Played, asked: Asked, 
     return AfterTrial(state, correct, leave=leave, fault=fault)
 
 
-def _void(state: SessionState, present: Present, asked: Asked, reply: Unanswered, sitting: Sitting) -> AfterTrial:
+def _void(
+    state: SessionState, present: Present, asked: StimulusReply, reply: Unanswered, sitting: Sitting
+) -> AfterTrial:
     played = release_device(sitting) if asked.holding else asked.played
     health = played.health if played is not None else None
     fault = health.fault if health is not None else Fault.NONE

@@ -109,7 +109,7 @@ class SessionSupervisor:
         self._press(look, now_s)
         if due:
             self._told_s = now_s
-            self._tell(self._live(look))
+            self._tell(self._live_state(look))
 
     def _press(self, look: Look, now_s: float) -> None:
         down = [number for number in self._buttons if number in look.buttons]
@@ -125,7 +125,7 @@ class SessionSupervisor:
         (x, y, z), (x0, y0, z0) = look.position_m, self._place_m
         return (x - x0, y - y0, z - z0)
 
-    def _live(self, look: Look) -> Live:
+    def _live_state(self, look: Look) -> Live:
         fault, offset, acceleration = self._device.fault(), self.offset_m(look), look.acceleration_mps2
         return Live(
             utc=self._clock.utc(),

@@ -9,7 +9,7 @@ from study.devices.opening import DEVICES
 from study.errors import StudyError
 from study.session.views.archive_views import HomeView, ProtocolLine, SessionLine
 from study.session.views.printable import printable, printable_text
-from study.store.disk.toml_text import read_toml_text
+from study.store.disk.text_file import read_toml_text
 from study.store.formats.identified_model_file import is_identified_model, read_identified_model
 from study.store.formats.protocol_files import ProtocolRefusedError, list_shipped_protocols, read_protocol
 from study.store.sessions.archive import session_folders

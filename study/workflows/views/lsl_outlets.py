@@ -14,7 +14,7 @@ LONGEST_FIRST_BYTES = 2**20
 
 
 @dataclass(frozen=True, slots=True)
-class Described:
+class StreamDescription:
     """A stream of samples as other programs see it."""
 
     name: str
@@ -27,7 +27,7 @@ class SignalOutlet(Protocol):
     """An LSL outlet of a stream of samples."""
 
     def push(self, samples: FloatArray, at_s: FloatArray) -> None:
-        """samples (n, channels); at_s (n,): on LSL's clock."""
+        """Send samples with their times. samples (n, channels); at_s (n,): on LSL's clock."""
         ...
 
 
@@ -47,13 +47,13 @@ class MarkerOutlet:
     def push(self, marker: str, at_s: float) -> None:
         self._outlet.push_sample([marker], at_s)
 
-    def signal_outlet(self, stream: Described, rate_hz: float) -> SignalOutlet:
+    def signal_outlet(self, stream: StreamDescription, rate_hz: float) -> SignalOutlet:
         """Another outlet of the same session."""
         return _Signals(self._library, f"{self._source} {stream.name}", stream, rate_hz)
 
 
 class _Signals:
-    def __init__(self, library: Any, source: str, stream: Described, rate_hz: float) -> None:
+    def __init__(self, library: Any, source: str, stream: StreamDescription, rate_hz: float) -> None:
         info = library.StreamInfo(stream.name, stream.kind, len(stream.channels), rate_hz, "double64", source)
         channels = info.desc().append_child("channels")
         for label, unit in zip(stream.channels, stream.units, strict=True):

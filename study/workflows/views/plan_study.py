@@ -44,9 +44,10 @@ class _Begun:
 
 
 def planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[PlannedStudy, ...]:
-    """protocol: a name or file; None = all that were begun in `data`. simulated: of simulated participants instead of
-    people, who are counted apart. Raises StudyError where there is nothing to plan."""
-    begun = _begun(data, simulated)
+    """The plans of studies in a data folder. protocol: a name or file; None = all that were begun in `data`. simulated:
+    of simulated participants instead of people, who are counted apart. Raises StudyError where there is nothing to
+    plan."""
+    begun = _find_begun(data, simulated)
     if protocol is not None:
         chosen = read_study_protocol(protocol, data).protocol
         return (_plan_from_sessions(data, chosen, [each for each in begun if each.protocol == chosen.name], simulated),)
@@ -63,7 +64,7 @@ def planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[
     return tuple(found)
 
 
-def _begun(data: Path, simulated: bool) -> list[_Begun]:
+def _find_begun(data: Path, simulated: bool) -> list[_Begun]:
     found = []
     for folder in session_folders(data):
         begun = begun_in(folder)
@@ -195,7 +196,7 @@ def lines(study: PlannedStudy) -> list[str]:
         short = [place for place, cell in enumerate(plan.cells) if cell.needed]
         places = ", ".join(f"{place + 1}" for place in short)
         found.append(f"orders still needed: {places}" if short else "orders still needed: none")
-    found.append(f"next: {study.next_code}{_said(plan)}")
+    found.append(f"next: {study.next_code}{_progress_text(plan)}")
     return [*found, *study.remarks]
 
 
@@ -203,7 +204,7 @@ def _titled_list(title: str, codes: Sequence[str]) -> list[str]:
     return [f"{title}: {', '.join(codes)}"] if codes else []
 
 
-def _said(plan: StudyPlan) -> str:
+def _progress_text(plan: StudyPlan) -> str:
     cell = plan.next_cell
     if cell is None:
         return ""

@@ -10,6 +10,7 @@ from study.store.sessions.request_inbox import RequestInbox
 HEARD_WITHIN_S = 3.0
 """A session checks about twenty times a second, except while a form or notice is shown."""
 LOOK_EVERY_S = 0.02
+"""Interval at which the reply is looked for (s)."""
 
 
 def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:

@@ -8,6 +8,7 @@ from study.session.views.local_time import Zone, local_time
 from study.workflows.results.fold_session import FoldedSession
 
 _HASH_DIGITS = 12
+"""Digits of the protocol's hash that are shown."""
 
 
 def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
@@ -25,9 +26,9 @@ def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], .
         ("device", _device(opened)),
         ("equalizer", opened.equalizer),
         ("its quality", _quality(opened)),
-        ("within reach", _reach(opened)),
+        ("within reach", _reach_text(opened)),
         ("begun", local_time(opened.utc, zone, "seconds")),
-        (_end(state), local_time(_last_utc(folded), zone, "seconds") + ahead),
+        (_end_text(state), local_time(_last_utc(folded), zone, "seconds") + ahead),
         ("sittings", str(1 + sum(isinstance(event, SessionResumed) for event in events))),
         ("runs", f"{state.run} of {len(state.runs)}"),
         ("answers", _answers(folded)),
@@ -39,7 +40,7 @@ def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], .
     return tuple((what, value) for what, value in facts if value)
 
 
-def _end(state: SessionState) -> str:
+def _end_text(state: SessionState) -> str:
     if state.sitting.turned_away:
         return "ended"
     return "finished" if state.closed else "last entry"
@@ -56,7 +57,7 @@ def _quality(opened: SessionOpened) -> str:
     return "" if opened.equalized is None else opened.equalized.quality or NOT_STORED
 
 
-def _reach(opened: SessionOpened) -> str:
+def _reach_text(opened: SessionOpened) -> str:
     """Acceleration that both directions reach at the cap."""
     if opened.equalized is None:
         return ""

@@ -46,12 +46,12 @@ class Outlet(Protocol):
         ...
 
     def push(self, marker: str, at_s: float) -> None:
-        """at_s: on LSL's clock."""
+        """Send a marker with its time. at_s: on LSL's clock."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class SideTasks:
     """What else is done between two looks at the log."""
 
     on_offset: Callable[[float], None]
@@ -60,7 +60,7 @@ class Beside:
     """Given that offset: sends what the device's loop did meanwhile, and answers how many ticks were lost."""
 
 
-NOTHING_BESIDE = Beside(lambda offset_s: None, lambda offset_s: 0)
+NOTHING_BESIDE = SideTasks(lambda offset_s: None, lambda offset_s: 0)
 
 
 class LogFollower:
@@ -88,7 +88,7 @@ def stream_session(
     on_marker: Callable[[str], None],
     now_s: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
-    beside: Beside = NOTHING_BESIDE,
+    beside: SideTasks = NOTHING_BESIDE,
 ) -> int:
     """Follow the log until the session is closed or Ctrl-C; of one that is closed already nothing is sent. Returns how
     many facts became markers. Raises StudyError."""
@@ -108,7 +108,7 @@ def stream_session(
                 outlet.push(_text({"event": "signals_lost", "ticks": lost}), outlet.clock_s())
             for line in follower.lines():
                 fact = _fact(line)
-                _send(fact, outlet, offset_s, now_s(), on_marker)
+                _send_fact(fact, outlet, offset_s, now_s(), on_marker)
                 sent += 1
                 if fact.get("event") == LAST:
                     return sent
@@ -135,7 +135,7 @@ def _fact(line: bytes) -> dict[str, Any]:
     return fact
 
 
-def _send(
+def _send_fact(
     fact: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
 ) -> None:
     fields = {name: fact[name] for name in TOLD if fact.get(name) is not None}

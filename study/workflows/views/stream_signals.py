@@ -11,7 +11,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.opening import telemetry_of
 from study.errors import StudyError
 from study.store.sessions.live_file import read_live
-from study.workflows.views.lsl_outlets import Described, SignalOutlet
+from study.workflows.views.lsl_outlets import SignalOutlet, StreamDescription
 
 if TYPE_CHECKING:
     from study.devices.telemetry import TelemetryReader
@@ -25,17 +25,17 @@ def _three(name: str) -> tuple[str, str, str]:
 
 
 STREAMS = (
-    Described("hapteq force", "Force", (*_three("commanded"), *_three("applied")), ("N",) * 6),
-    Described("hapteq acceleration", "Acceleration", _three("acceleration"), ("m/s^2",) * 3),
-    Described("hapteq motion", "Motion", (*_three("position"), *_three("velocity")), ("m",) * 3 + ("m/s",) * 3),
-    Described("hapteq loop", "Status", ("tick", "phase", "fault", "missed_ticks"), ("",) * 4),
+    StreamDescription("hapteq force", "Force", (*_three("commanded"), *_three("applied")), ("N",) * 6),
+    StreamDescription("hapteq acceleration", "Acceleration", _three("acceleration"), ("m/s^2",) * 3),
+    StreamDescription("hapteq motion", "Motion", (*_three("position"), *_three("velocity")), ("m",) * 3 + ("m/s",) * 3),
+    StreamDescription("hapteq loop", "Status", ("tick", "phase", "fault", "missed_ticks"), ("",) * 4),
 )
 
 
 class SignalStreams:
     """folder: of the session. open_outlet(stream, rate_hz): called when a loop is there for the first time."""
 
-    def __init__(self, folder: Path, open_outlet: Callable[[Described, float], SignalOutlet]) -> None:
+    def __init__(self, folder: Path, open_outlet: Callable[[StreamDescription, float], SignalOutlet]) -> None:
         self._folder = folder
         self._open_outlet = open_outlet
         self._path, self._calls = "", 0
@@ -48,11 +48,11 @@ class SignalStreams:
         """Send the ticks since the last call; offset_s: LSL's clock less the session's. How many ticks were lost."""
         lost = self._push_new(offset_s)
         if self._calls % LOOK_EVERY == 0:
-            self._look()
+            self._push_new_rows()
         self._calls += 1
         return lost
 
-    def _look(self) -> None:
+    def _push_new_rows(self) -> None:
         live = read_live(self._folder)
         if live is None or live.telemetry == self._path:
             return

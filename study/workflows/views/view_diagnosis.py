@@ -24,7 +24,8 @@ FIT_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allo
 
 
 def diagnosis_view(path: Path) -> DiagnosisView:
-    """Raises CannotReadError, UnusableFileError."""
+    """The view of a diagnosis, from its document and the improved model beside it. Raises CannotReadError,
+    UnusableFileError."""
     diagnosis, device = read_diagnosis(path), _device(path.parent / "improved.toml")
     report = path.parent / "report.html"
     view = DiagnosisView(
@@ -35,7 +36,7 @@ def diagnosis_view(path: Path) -> DiagnosisView:
         mismatch=_mismatches(diagnosis.mismatch),
         fit=(FIT_HEADER, _errors("fit", diagnosis.fit.fit), _errors("test", diagnosis.fit.test)),
         remainder=_mismatches(diagnosis.remainder),
-        next_experiment=_next(diagnosis),
+        next_experiment=_next_experiment_text(diagnosis),
         report=str(report) if report.is_file() else "",
         notes=_notes(diagnosis),
         candidates=candidate_sentences(diagnosis, device),
@@ -81,7 +82,7 @@ def _errors(record: str, errors: Errors) -> tuple[str, ...]:
     return (record, *(NONE if value is None else f"{value:.4f}" for value in values))
 
 
-def _next(diagnosis: Diagnosis) -> str:
+def _next_experiment_text(diagnosis: Diagnosis) -> str:
     following = diagnosis.next_experiment
     if following is None:
         return ""

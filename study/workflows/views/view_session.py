@@ -37,10 +37,10 @@ def session_view(path: Path, zone: Zone = in_utc) -> SessionView:
         folded = None if folder.withdrawn else fold_session(folder)
     except StudyError as problem:
         return printable(_view_damaged(folder, problem, zone))
-    return printable(_bare(folder, session_line(folder)) if folded is None else _whole(folder, folded, zone))
+    return printable(_bare_view(folder, session_line(folder)) if folded is None else _full_view(folder, folded, zone))
 
 
-def _whole(folder: SessionFolder, folded: FoldedSession, zone: Zone) -> SessionView:
+def _full_view(folder: SessionFolder, folded: FoldedSession, zone: Zone) -> SessionView:
     state = folded.state
     analysis, problem = _analysis(state)
     clock = (f"Before {local_time(step.utc, zone)}: {step.sentence}" for step in state.sitting.clock_steps)
@@ -78,10 +78,10 @@ def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> Ses
         )  # fmt: skip
     sentences = tuple(part for part in (problem.happened, problem.saved, problem.do_now) if part)
     events = log_in_words(readable_events(folder.log), zone)
-    return _bare(folder, line, warnings=(f"{problem.title}.", *sentences), events=events)
+    return _bare_view(folder, line, warnings=(f"{problem.title}.", *sentences), events=events)
 
 
-def _bare(
+def _bare_view(
     folder: SessionFolder, line: SessionLine, warnings: tuple[str, ...] = (), events: tuple[str, ...] = ()
 ) -> SessionView:
     facts = (("participant", line.subject), ("folder", str(folder.path)))

@@ -10,13 +10,13 @@ from study.session.facts.events import SessionOpened, parse_event
 from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained
 from study.session.facts.log_time import seconds_between
 from study.session.state.draw_check import LogContradiction
+from study.session.watching.followed_session import FollowedSession, begin_watching
+from study.session.watching.followed_session import follow as after
 from study.session.watching.live import Live
+from study.session.watching.make_watch_view import LiveInfo, watch_view
 from study.session.watching.requests import Request
 from study.session.watching.watch_alarms import SILENT_AFTER_S
 from study.session.watching.watch_view import DriftLine, WatchView
-from study.session.watching.watched import Watched, begin_watching
-from study.session.watching.watched import follow as after
-from study.session.watching.watching import LiveInfo, watch_view
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live
 from study.store.sessions.log_seal import read_seal, seal_paths
@@ -46,7 +46,7 @@ class Follower:
 
     def __init__(self, folder: SessionFolder) -> None:
         self._folder = folder
-        self._watched: Watched | None = None
+        self._watched: FollowedSession | None = None
         self._read_bytes = 0
         self._last_line = b""
         self._chain = Chain()
@@ -67,7 +67,7 @@ class Follower:
         self._view = watch_view(self._watched, beside, now_utc, self._view)
         return self._view
 
-    def _look_for_drifts(self, watched: Watched) -> tuple[DriftLine, ...]:
+    def _look_for_drifts(self, watched: FollowedSession) -> tuple[DriftLine, ...]:
         if not watched.probes:
             return ()
         if self._drifts is None:  # its arrays take long to import, and most sessions have no probes

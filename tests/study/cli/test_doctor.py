@@ -270,7 +270,7 @@ def measured(late_ms: float, load: float, simulated: bool) -> Timing:
 )
 def test_verdict_figures_summary_and_exit_code_agree(capsys, late_ms, load, simulated, code, verdicts, summary):
     looked = examination(measured(late_ms, load, simulated))
-    doctor._say(looked)
+    doctor._print_findings(looked)
     lines = capsys.readouterr().out.splitlines()
     timing = [
         line.split() for line in lines[lines.index("Timing") + 1 : -1] if line.startswith("  ") and line[2] != " "

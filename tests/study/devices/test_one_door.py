@@ -25,7 +25,7 @@ NAMED_IN = {
         "study/devices/force_dimension/handle.py",
         "study/devices/force_dimension/rig.py",
         "study/devices/force_dimension/findings.py",  # zero only
-        "study/devices/force_dimension/watchdog_proof.py",  # zero only
+        "study/devices/force_dimension/watchdog_check.py",  # zero only
     },
     "dhdSetForce": {
         "study/devices/force_dimension/handle.py",
@@ -38,13 +38,13 @@ NAMED_IN = {
         "study/devices/drive/realtime_drive.py",  # which asks it for ticks
     },
     "CompiledTicks": {"study/devices/drive/stepped_runner.py"},
-    "write_once": {"study/devices/force_dimension/halves.py", "study/devices/force_dimension/rig.py"},
+    "write_once": {"study/devices/force_dimension/tick_io.py", "study/devices/force_dimension/rig.py"},
     "send_once": {
-        "study/devices/force_dimension/halves.py",
+        "study/devices/force_dimension/tick_io.py",
         "study/devices/force_dimension/rig.py",  # zero only
     },
-    "hold_unchecked": {"study/devices/force_dimension/force_proof.py"},
-    "given_past_this_n": {"study/devices/force_dimension/force_proof.py"},
+    "hold_unchecked": {"study/devices/force_dimension/force_limit_check.py"},
+    "given_past_this_n": {"study/devices/force_dimension/force_limit_check.py"},
     "Standby": set(),
     "run_block": set(),
 }

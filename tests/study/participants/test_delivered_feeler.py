@@ -6,7 +6,7 @@ import pytest
 
 from protocols.trial import Phase
 from study.participants.delivered_feeler import DeliveredFeeler
-from study.participants.observer import Felt
+from study.participants.observer import PerceivedStimulus
 from study.participants.observers import find_observer
 from study.participants.population import TYPICAL_THRESHOLDS_N, member, person
 from study.session.stimulus.delivered import Delivered
@@ -25,7 +25,7 @@ def felt(level_n=THRESHOLD_N, along=1.0, across=0.0, harmonics=0.0, trial=0):
     """At 15 Hz; along: as a share of what a flawless device delivers, across and harmonics as shares of that."""
     mps2 = PER_NEWTON * level_n * along
     delivered = Delivered(mps2, across * mps2, 0.1, harmonics * mps2)
-    return Felt(0, trial, 0, Phase.TEST, 15.0, level_n, 1, trial, delivered=delivered)
+    return PerceivedStimulus(0, trial, 0, Phase.TEST, 15.0, level_n, 1, trial, delivered=delivered)
 
 
 def test_a_flawless_delivery_is_felt_as_commanded(observer):

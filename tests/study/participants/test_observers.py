@@ -13,11 +13,11 @@ from study.errors import WrongUseError
 from study.participants.detection import TYPICAL_DETECTION_N
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.intensity_cue import IntensityCue
-from study.participants.observer import Felt, Observer
+from study.participants.observer import Observer, PerceivedStimulus
 from study.participants.observers import OBSERVERS, find_observer
 from study.participants.population import TYPICAL_THRESHOLDS_N
 
-FELT = Felt(
+FELT = PerceivedStimulus(
     run=0, trial=0, attempt=0, phase=Phase.TEST, frequency_hz=15.0, level_n=0.6, direction_shown=1, trials_before=0
 )
 N = 4000
@@ -29,7 +29,7 @@ def shown(trial: int, seed: int = 1) -> int:
     return draw_trial(ScheduleSettings(), "random", seed, 0, trial, 0).direction
 
 
-def trials(frequency_hz: float = 15.0, level_n: float = 0.6, seed: int = 1) -> list[Felt]:
+def trials(frequency_hz: float = 15.0, level_n: float = 0.6, seed: int = 1) -> list[PerceivedStimulus]:
     """N trials of one run, directions drawn as a session draws them."""
     return [
         replace(
@@ -44,11 +44,11 @@ def trials(frequency_hz: float = 15.0, level_n: float = 0.6, seed: int = 1) -> l
     ]
 
 
-def share_right(observer: Observer, felt: list[Felt], seed: int = 1) -> float:
+def share_right(observer: Observer, felt: list[PerceivedStimulus], seed: int = 1) -> float:
     return float(np.mean([observer.reply(each, seed).answer == each.direction_shown for each in felt]))
 
 
-def share_of_1(observer: Observer, felt: list[Felt], seed: int = 1) -> float:
+def share_of_1(observer: Observer, felt: list[PerceivedStimulus], seed: int = 1) -> float:
     return float(np.mean([observer.reply(each, seed).answer == 1 for each in felt]))
 
 
@@ -139,7 +139,7 @@ def test_between_frequencies_thresholds_lie_between_and_beyond_the_ends_they_sta
     assert shares[0] == shares[1] > shares[2] > shares[3] > shares[4] == shares[5]
 
 
-def detection(frequency_hz: float, level_n: float) -> list[Felt]:
+def detection(frequency_hz: float, level_n: float) -> list[PerceivedStimulus]:
     return [replace(felt, phase=Phase.DETECTION) for felt in trials(frequency_hz, level_n)]
 
 

@@ -12,7 +12,7 @@ from protocols.procedure.schedule import draw_trial, runs
 from protocols.procedure.staircase import begin, is_finished, level_n, step, to_newton
 from protocols.trial import Phase
 from study.participants.detection import TYPICAL_DETECTION_N
-from study.participants.observer import Felt, Observer
+from study.participants.observer import Observer, PerceivedStimulus
 from study.participants.observers import find_observer
 from study.participants.population import population
 
@@ -27,7 +27,9 @@ def sitting(protocol: StudyProtocol, observer: Observer, seed: int) -> dict[floa
         while not is_finished(protocol.staircase, state):
             draw = draw_trial(protocol.schedule, "random", seed, run.index, state.trials, 0)
             level = level_n(protocol.staircase, state)
-            felt = Felt(run.index, state.trials, 0, run.phase, run.frequency_hz, level, draw.direction, answered)
+            felt = PerceivedStimulus(
+                run.index, state.trials, 0, run.phase, run.frequency_hz, level, draw.direction, answered
+            )
             answered += 1
             state = step(protocol.staircase, state, observer.reply(felt, seed).answer == draw.direction)
         if run.phase is Phase.TEST:

@@ -8,14 +8,14 @@ import pytest
 
 from protocols.trial import Phase
 from study.participants.direction_feeler import DirectionFeeler
-from study.participants.observer import Felt
+from study.participants.observer import PerceivedStimulus
 from study.participants.observers import find_observer
 from study.participants.population import KINDS, member
 from study.participants.unsure import UnsureRepeater
 
 N = 3000
 NORMAL = NormalDist()
-AT_THRESHOLD = Felt(0, 0, 0, Phase.TEST, 15.0, 0.6, 1, 0)
+AT_THRESHOLD = PerceivedStimulus(0, 0, 0, Phase.TEST, 15.0, 0.6, 1, 0)
 """79.37 % right with one look: d' = 1.639."""
 
 

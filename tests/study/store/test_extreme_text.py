@@ -11,7 +11,7 @@ from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
-from study.store.disk.toml_text import too_long_key
+from study.store.disk.text_file import too_long_key
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.workflows.files.validate import validate_file
 from study.workflows.recording.import_recording import read_foreign

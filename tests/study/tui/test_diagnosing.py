@@ -24,7 +24,7 @@ def files(module_at, tmp_path):
     return tmp_path
 
 
-class Sitter:
+class SittingOptions:
     def __init__(self, app, pilot):
         self.app, self.pilot = app, pilot
 
@@ -45,7 +45,7 @@ def run(data, story):
 
     async def play():
         async with app.run_test(size=(100, 30)) as pilot:
-            await story(Sitter(app, pilot))
+            await story(SittingOptions(app, pilot))
 
     try:
         asyncio.run(play())

@@ -10,7 +10,7 @@ from study.devices.clock import VirtualClock
 from study.participants.observers import find_observer
 from study.session.views.views import Answered, Reply, Unanswered
 from study.store.sessions.archive import SessionFolder
-from study.workflows.session.conduct_session import Conducted, Participant, conduct_new, conduct_resumed
+from study.workflows.session.conduct_session import ConductedSitting, Participant, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_display import SimulatedDisplay
 
@@ -39,7 +39,7 @@ class LeavesAfter:
 
 
 @dataclass
-class Sitter:
+class SittingOptions:
     """Conducts sessions of the small protocol below one data folder."""
 
     data: Path
@@ -57,26 +57,26 @@ class Sitter:
         shown = display if after is None else LeavesAfter(display, after, instead)
         return Participant(display=shown, hand=display, clock=clock)
 
-    def whole(self, subject: str = "P01") -> Conducted:
+    def whole(self, subject: str = "P01") -> ConductedSitting:
         return conduct_new(self.plan(subject), "simulated", self.participant())
 
-    def interrupted(self, after: int, instead=None) -> Conducted:
+    def interrupted(self, after: int, instead=None) -> ConductedSitting:
         leave = instead or (lambda: Unanswered("the participant left", leave=True))
         return conduct_new(self.plan(), "simulated", self.participant(after, leave))
 
-    def resumed(self, folder: SessionFolder) -> Conducted:
+    def resumed(self, folder: SessionFolder) -> ConductedSitting:
         return conduct_resumed(folder, "simulated", self.participant())
 
 
 @pytest.fixture
-def sitter(tmp_path, small_protocol, small_text) -> Sitter:
-    return Sitter(tmp_path / "data", small_protocol, small_text)
+def sitter(tmp_path, small_protocol, small_text) -> SittingOptions:
+    return SittingOptions(tmp_path / "data", small_protocol, small_text)
 
 
 @pytest.fixture(scope="session")
-def sitter_of() -> type[Sitter]:
+def sitter_of() -> type[SittingOptions]:
     """For a protocol of one's own, or for a session that a whole module shares."""
-    return Sitter
+    return SittingOptions
 
 
 @pytest.fixture

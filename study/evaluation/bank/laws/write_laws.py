@@ -75,7 +75,7 @@ def law_lines(proof: LawProof) -> Iterator[str]:
     yield f"{len(proof.score.misses)} misses in {len(proof.outcomes)} cases"
     for miss in proof.score.misses:
         truth = miss.kind if miss.truth is None else miss.truth.formula
-        yield f"  {miss.number:5d} {miss.concealed or 'nothing'} ({truth}): {_said(miss)}"
+        yield f"  {miss.number:5d} {miss.concealed or 'nothing'} ({truth}): {_answer_text(miss)}"
     yield ""
     for figure in proof.score.figures:
         yield f"{figure.name:52s} {figure_text(figure)}"
@@ -103,7 +103,7 @@ def _facts(proof: LawProof) -> dict[str, Any]:
     }
 
 
-def _said(of: LawOutcome) -> str:
+def _answer_text(of: LawOutcome) -> str:
     laws = " and ".join(_law_text(law) for law in of.laws)
     how = "" if of.named or not of.candidates else "candidate "
     names = ", ".join(of.names)

@@ -5,9 +5,9 @@ above `width` is reduced by `width`. The lag has one pole. Saturation is a hard 
 """
 
 from study.evaluation.challenge.actuator_kernel import DEAD, DELAY_S, GAIN, LAG_S, LIMIT, RATE
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_amplifier
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.drive_plan import LEVELS_N
-from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_amplifier
 
 
 def _draw_saturation(at: EffectContext) -> dict[str, float]:
@@ -59,10 +59,10 @@ def _build_gain(device: Device, axis: int, values: Values) -> Device:
 
 
 EFFECTS = (
-    HiddenEffect("force_saturation", "actuator", True, _draw_saturation, _build_saturation),
-    HiddenEffect("force_deadband", "actuator", True, _draw_deadband, _build_deadband),
-    HiddenEffect("slew_limit", "actuator", False, _draw_slew, _build_slew),
-    HiddenEffect("amplifier_lag", "actuator", False, _draw_lag, _build_lag),
-    HiddenEffect("transport_delay", "actuator", False, _draw_delay, _build_delay),
-    HiddenEffect("force_gain", "actuator", True, _draw_gain, _build_gain),
+    ConcealedEffect("force_saturation", "actuator", True, _draw_saturation, _build_saturation),
+    ConcealedEffect("force_deadband", "actuator", True, _draw_deadband, _build_deadband),
+    ConcealedEffect("slew_limit", "actuator", False, _draw_slew, _build_slew),
+    ConcealedEffect("amplifier_lag", "actuator", False, _draw_lag, _build_lag),
+    ConcealedEffect("transport_delay", "actuator", False, _draw_delay, _build_delay),
+    ConcealedEffect("force_gain", "actuator", True, _draw_gain, _build_gain),
 )

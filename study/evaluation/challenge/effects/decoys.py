@@ -12,11 +12,18 @@ from dataclasses import replace
 import numpy as np
 
 from study.evaluation.challenge.actuator_kernel import FADE, FADE_S, HELD
+from study.evaluation.challenge.concealed_effect import (
+    ConcealedEffect,
+    EffectContext,
+    Values,
+    with_amplifier,
+    with_forces,
+)
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import DAMPING_SQUARE
-from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_amplifier, with_forces
 
 CREEP_TIMES_S = (0.02, 0.2, 2.0)
+"""Time constants of the creep (s), a decade apart."""
 
 
 def _draw_creep(at: EffectContext) -> dict[str, float]:
@@ -89,12 +96,12 @@ def _build_iron(device: Device, axis: int, values: Values) -> Device:
 
 
 DECOYS = (
-    HiddenEffect("creep", "mechanism", True, _draw_creep, _build_creep),
-    HiddenEffect("damping_of_place", "mechanism", True, _draw_damping, _build_damping),
-    HiddenEffect("stiffness_in_time", "mechanism", True, _draw_swing, _build_swing),
-    HiddenEffect("bending_sensor", "sensor", False, _draw_bending, _build_bending),
-    HiddenEffect("crossed_axes", "mechanism", False, _draw_crossed, _build_crossed),
-    HiddenEffect("skipped_commands", "actuator", False, _draw_skipped, _build_skipped),
-    HiddenEffect("tired_motor", "actuator", True, _draw_tired, _build_tired),
-    HiddenEffect("force_hysteresis", "actuator", True, _draw_iron, _build_iron),
+    ConcealedEffect("creep", "mechanism", True, _draw_creep, _build_creep),
+    ConcealedEffect("damping_of_place", "mechanism", True, _draw_damping, _build_damping),
+    ConcealedEffect("stiffness_in_time", "mechanism", True, _draw_swing, _build_swing),
+    ConcealedEffect("bending_sensor", "sensor", False, _draw_bending, _build_bending),
+    ConcealedEffect("crossed_axes", "mechanism", False, _draw_crossed, _build_crossed),
+    ConcealedEffect("skipped_commands", "actuator", False, _draw_skipped, _build_skipped),
+    ConcealedEffect("tired_motor", "actuator", True, _draw_tired, _build_tired),
+    ConcealedEffect("force_hysteresis", "actuator", True, _draw_iron, _build_iron),
 )

@@ -7,11 +7,12 @@ slope x + bend x^2). Stribeck's excess of static friction falls as exp(-(v / spe
 
 from dataclasses import replace
 
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_cells
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.friction_kernel import BEND, NEGATIVE, POSITIVE, SLOPE, SPEED, STATIC_RATIO, STIFFNESS
-from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_cells
 
 STIFF_N_PER_M = 3e6
+"""Stiffness of the bristle where the effect has none of its own: far stiffer than any part of a bench."""
 
 
 def _with_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:
@@ -73,9 +74,9 @@ def _build_along(device: Device, axis: int, values: Values) -> Device:
 
 
 EFFECTS = (
-    HiddenEffect("coulomb_friction", "mechanism", True, _draw_coulomb, _build_coulomb),
-    HiddenEffect("asymmetric_friction", "mechanism", True, _draw_asymmetric, _build_asymmetric),
-    HiddenEffect("stribeck_friction", "mechanism", True, _draw_stribeck, _build_stribeck),
-    HiddenEffect("presliding_hysteresis", "mechanism", True, _draw_presliding, _build_presliding),
-    HiddenEffect("position_dependent_friction", "mechanism", True, _draw_along, _build_along),
+    ConcealedEffect("coulomb_friction", "mechanism", True, _draw_coulomb, _build_coulomb),
+    ConcealedEffect("asymmetric_friction", "mechanism", True, _draw_asymmetric, _build_asymmetric),
+    ConcealedEffect("stribeck_friction", "mechanism", True, _draw_stribeck, _build_stribeck),
+    ConcealedEffect("presliding_hysteresis", "mechanism", True, _draw_presliding, _build_presliding),
+    ConcealedEffect("position_dependent_friction", "mechanism", True, _draw_along, _build_along),
 )

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values
 from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, RATE, STIFFNESS_DEPTH, TURN
 
 
@@ -56,6 +56,6 @@ def _build_grip(device: Device, axis: int, values: Values) -> Device:
 
 
 EFFECTS = (
-    HiddenEffect("hand_impedance", "hand", False, _draw_hand, _build_hand),
-    HiddenEffect("time_varying_grip", "hand", False, _draw_grip, _build_grip),
+    ConcealedEffect("hand_impedance", "hand", False, _draw_hand, _build_hand),
+    ConcealedEffect("time_varying_grip", "hand", False, _draw_grip, _build_grip),
 )

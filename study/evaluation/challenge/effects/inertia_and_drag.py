@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_forces
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import DRAG
-from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_forces
 
 
 def _at_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Device:
@@ -100,10 +100,10 @@ def _build_backlash(device: Device, axis: int, values: Values) -> Device:
 
 
 EFFECTS = (
-    HiddenEffect("viscous_damping", "mechanism", True, _draw_viscous, _build_viscous),
-    HiddenEffect("added_mass", "mechanism", True, _draw_added, _build_added),
-    HiddenEffect("quadratic_damping", "mechanism", True, _draw_quadratic, _build_quadratic),
-    HiddenEffect("pose_dependent_inertia", "mechanism", True, _draw_pose, _build_pose),
-    HiddenEffect("extra_mode", "mechanism", True, _draw_mode, _build_mode),
-    HiddenEffect("backlash", "mechanism", True, _draw_backlash, _build_backlash),
+    ConcealedEffect("viscous_damping", "mechanism", True, _draw_viscous, _build_viscous),
+    ConcealedEffect("added_mass", "mechanism", True, _draw_added, _build_added),
+    ConcealedEffect("quadratic_damping", "mechanism", True, _draw_quadratic, _build_quadratic),
+    ConcealedEffect("pose_dependent_inertia", "mechanism", True, _draw_pose, _build_pose),
+    ConcealedEffect("extra_mode", "mechanism", True, _draw_mode, _build_mode),
+    ConcealedEffect("backlash", "mechanism", True, _draw_backlash, _build_backlash),
 )

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values
 from study.evaluation.challenge.sensor import Sensor
 
 
@@ -167,17 +167,17 @@ def _build_logger(device: Device, axis: int, values: Values) -> Device:
 
 
 EFFECTS = (
-    HiddenEffect("sensor_lag", "sensor", False, _draw_lag, _build_lag),
-    HiddenEffect("sensor_clipping", "sensor", True, _draw_clipping, _build_clipping),
-    HiddenEffect("sensor_misalignment", "sensor", False, _draw_misalignment, _build_misalignment),
-    HiddenEffect("sensor_gain", "sensor", True, _draw_gain, _build_gain),
-    HiddenEffect("sensor_nonlinearity", "sensor", True, _draw_curve, _build_curve),
-    HiddenEffect("sensor_drift", "sensor", False, _draw_drift, _build_drift),
-    HiddenEffect("quantization", "sensor", False, _draw_steps, _build_steps),
-    HiddenEffect("mains_hum", "sensor", False, _draw_hum, _build_hum),
-    HiddenEffect("clock_drift", "sensor", False, _draw_clock, _build_clock),
-    HiddenEffect("lost_samples", "sensor", False, _draw_lost, _build_lost),
-    HiddenEffect("cross_axis_sensitivity", "sensor", True, _draw_crossed, _build_crossed),
-    HiddenEffect("sensor_offset", "sensor", True, _draw_offset, _build_offset),
-    HiddenEffect("logger_offset", "sensor", False, _draw_logger, _build_logger),
+    ConcealedEffect("sensor_lag", "sensor", False, _draw_lag, _build_lag),
+    ConcealedEffect("sensor_clipping", "sensor", True, _draw_clipping, _build_clipping),
+    ConcealedEffect("sensor_misalignment", "sensor", False, _draw_misalignment, _build_misalignment),
+    ConcealedEffect("sensor_gain", "sensor", True, _draw_gain, _build_gain),
+    ConcealedEffect("sensor_nonlinearity", "sensor", True, _draw_curve, _build_curve),
+    ConcealedEffect("sensor_drift", "sensor", False, _draw_drift, _build_drift),
+    ConcealedEffect("quantization", "sensor", False, _draw_steps, _build_steps),
+    ConcealedEffect("mains_hum", "sensor", False, _draw_hum, _build_hum),
+    ConcealedEffect("clock_drift", "sensor", False, _draw_clock, _build_clock),
+    ConcealedEffect("lost_samples", "sensor", False, _draw_lost, _build_lost),
+    ConcealedEffect("cross_axis_sensitivity", "sensor", True, _draw_crossed, _build_crossed),
+    ConcealedEffect("sensor_offset", "sensor", True, _draw_offset, _build_offset),
+    ConcealedEffect("logger_offset", "sensor", False, _draw_logger, _build_logger),
 )

@@ -6,6 +6,7 @@ an end stop is a spring that begins at `position`, on that side only or symmetri
 
 import numpy as np
 
+from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_forces
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import (
     ABOVE,
@@ -18,7 +19,6 @@ from study.evaluation.challenge.handle_force_kernel import (
     SQUARE,
     STOP,
 )
-from study.evaluation.challenge.hidden import EffectContext, HiddenEffect, Values, with_forces
 
 
 def _draw_hardening(at: EffectContext) -> dict[str, float]:
@@ -77,9 +77,9 @@ def _build_stop(device: Device, axis: int, values: Values) -> Device:
 
 
 EFFECTS = (
-    HiddenEffect("hardening_stiffness", "mechanism", True, _draw_hardening, _build_hardening),
-    HiddenEffect("asymmetric_stiffness", "mechanism", True, _draw_asymmetric, _build_asymmetric),
-    HiddenEffect("constant_force", "mechanism", True, _draw_constant, _build_constant),
-    HiddenEffect("cogging", "mechanism", True, _draw_cogging, _build_cogging),
-    HiddenEffect("end_stop", "mechanism", True, _draw_stop, _build_stop),
+    ConcealedEffect("hardening_stiffness", "mechanism", True, _draw_hardening, _build_hardening),
+    ConcealedEffect("asymmetric_stiffness", "mechanism", True, _draw_asymmetric, _build_asymmetric),
+    ConcealedEffect("constant_force", "mechanism", True, _draw_constant, _build_constant),
+    ConcealedEffect("cogging", "mechanism", True, _draw_cogging, _build_cogging),
+    ConcealedEffect("end_stop", "mechanism", True, _draw_stop, _build_stop),
 )

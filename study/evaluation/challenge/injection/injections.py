@@ -15,7 +15,7 @@ from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.injection.axis_motion import axis_motion, takes_of
 from study.evaluation.challenge.injection.drive_injections import ForceInjection
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
-from study.evaluation.challenge.injection.spoiled_readings import (
+from study.evaluation.challenge.injection.reading_faults import (
     clip,
     cross,
     cubic,
@@ -95,7 +95,7 @@ def _draw_turn(at: Reading, strength: float, random: np.random.Generator) -> dic
     return {"degrees": _log_between(1.0, 20.0, strength), "about_x": float(x), "about_y": float(y), "about_z": float(z)}
 
 
-def _either(random: np.random.Generator) -> float:
+def _random_sign(random: np.random.Generator) -> float:
     return float(random.choice((-1.0, 1.0)))
 
 
@@ -113,14 +113,16 @@ INJECTIONS: tuple[Injection, ...] = (
         },
         hum,
     ),
-    Injection("sensor_drift", lambda at, s, r: {"total": _either(r) * at.rms * _log_between(0.05, 3.0, s)}, drift),
-    Injection("sensor_offset", lambda at, s, r: {"offset": _either(r) * at.rms * _log_between(0.02, 1.5, s)}, offset),
+    Injection("sensor_drift", lambda at, s, r: {"total": _random_sign(r) * at.rms * _log_between(0.05, 3.0, s)}, drift),
+    Injection(
+        "sensor_offset", lambda at, s, r: {"offset": _random_sign(r) * at.rms * _log_between(0.02, 1.5, s)}, offset
+    ),
     Injection("quantization", lambda at, s, r: {"step": at.rms * _log_between(0.05, 1.5, s)}, steps),
     Injection("lost_samples", lambda at, s, r: {"fraction": _log_between(0.003, 0.3, s)}, lose),
     Injection(
         "clock_drift",
         lambda at, s, r: {
-            "ppm": _either(r) * min(1e6 * _log_between(0.02, 1.0, s) / at.middle_hz / at.seconds, FASTEST_PPM)
+            "ppm": _random_sign(r) * min(1e6 * _log_between(0.02, 1.0, s) / at.middle_hz / at.seconds, FASTEST_PPM)
         },
         other_clock,
     ),
@@ -131,10 +133,12 @@ INJECTIONS: tuple[Injection, ...] = (
         "logger_offset", lambda at, s, r: {"offset": _log_between(0.005, 0.1, s) / at.middle_hz}, late, memory=True
     ),
     Injection(
-        "sensor_nonlinearity", lambda at, s, r: {"cubic": _either(r) * _log_between(0.02, 0.3, s) / at.peak**2}, cubic
+        "sensor_nonlinearity",
+        lambda at, s, r: {"cubic": _random_sign(r) * _log_between(0.02, 0.3, s) / at.peak**2},
+        cubic,
     ),
     Injection(
-        "sensor_asymmetry", lambda at, s, r: {"square": _either(r) * _log_between(0.02, 0.4, s) / at.peak}, square
+        "sensor_asymmetry", lambda at, s, r: {"square": _random_sign(r) * _log_between(0.02, 0.4, s) / at.peak}, square
     ),
     Injection("sensor_noise", lambda at, s, r: {"rms": at.rms * _log_between(0.003, 0.5, s)}, noise),
     Injection("sensor_play", lambda at, s, r: {"gap": at.rms * _log_between(0.01, 0.6, s)}, play, memory=True),

@@ -1,1 +1,1 @@
-"""Laws outside the catalogue, built into devices of the challenge: `hidden_laws` (which), `draw_law` (a bank)."""
+"""Laws outside the catalogue, built into devices of the challenge: `concealed_laws` (which), `draw_law` (a bank)."""

@@ -9,7 +9,7 @@ from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 from study.evaluation.challenge.law_kernel import law_force, law_memory
-from study.evaluation.challenge.laws.hidden_laws import LawKind, Random, Sizes
+from study.evaluation.challenge.laws.concealed_laws import LawKind, Random, Sizes
 from study.evaluation.challenge.mechanism_kernel import Motion
 
 WEAKEST, STRONGEST = 0.015, 0.25
@@ -50,7 +50,7 @@ def build_law(
         device, size = _build_change(device, kind, (moved, command), places, (first, second, side, share))
     else:
         row = np.array([kind.code, axis, other, 1.0, first, second, side])
-        size = share * _rms(command[:, axis]) / _rms(_along(row, moved, command))
+        size = share * _rms(command[:, axis]) / _rms(_force_along_motion(row, moved, command))
         rows = [[kind.code, axis, other, size, first, second, side]]
         if kind.both:
             rows.append([kind.code, other, axis, size, first, second, -side])
@@ -102,7 +102,7 @@ def _build_change(
     return replace(device, drive_law=become), size
 
 
-def _along(row: FloatArray, moved: Motion, command: FloatArray) -> FloatArray:
+def _force_along_motion(row: FloatArray, moved: Motion, command: FloatArray) -> FloatArray:
     """(samples,): force of the law along the given motion."""
     kept, force = 0.0, np.zeros(len(command))
     for k in range(len(command)):

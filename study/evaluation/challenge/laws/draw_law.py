@@ -18,7 +18,7 @@ from study.evaluation.challenge.draw_case import EFFECTS, Case, Concealed, draw_
 from study.evaluation.challenge.drive_plan import RATE_HZ, DrivePlan, draw_plan, multisine
 from study.evaluation.challenge.extras import with_extras
 from study.evaluation.challenge.laws.build_law import LawTruth, build_law
-from study.evaluation.challenge.laws.hidden_laws import LAW_KINDS, LAW_OF_NAME
+from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, LAW_OF_NAME
 from study.evaluation.challenge.mechanism_kernel import Motion
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import Rig
@@ -36,6 +36,7 @@ ONE_AXIS = 0.75
 LOUD_N = 4.5
 """Level (N) of a stretch kept for the test: 1.5 times the highest level used to find laws."""
 FRESH_N, FRESH_PERIOD, FRESH_PERIODS = 2.0, 2000, 2
+"""Test motion that no recording contains: peak of its multisine, samples per period, periods."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +113,8 @@ def law_case(each: LawDraw, name: str) -> LawCase:
     model = as_model(name, known, tolerance, rig.axes)
     recording = make_recording(name, plan, response, position, rig)
     both = tuple((part.acceleration, part.position) for part in (free, moved))
-    case = Case(recording, model, (), _never, visibility(bare, device, (both[0], both[1]), rig))
-    return LawCase(case, truth, tuple(_fresh(device, rig, random, level) for level in (FRESH_N, LOUD_N)))
+    case = Case(recording, model, (), _refuse_further, visibility(bare, device, (both[0], both[1]), rig))
+    return LawCase(case, truth, tuple(_make_fresh(device, rig, random, level) for level in (FRESH_N, LOUD_N)))
 
 
 def _lawful(
@@ -136,11 +137,11 @@ def _lawful(
     raise ValueError(f"the device runs away with the law '{each.concealed}', seed {each.seed}")
 
 
-def _never(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
+def _refuse_further(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
     raise ValueError("a device with a law is not recorded again")
 
 
-def _fresh(device: Device, rig: Rig, random: np.random.Generator, level_n: float) -> Fresh:
+def _make_fresh(device: Device, rig: Rig, random: np.random.Generator, level_n: float) -> Fresh:
     command = np.zeros((FRESH_PERIOD * FRESH_PERIODS, 3))
     for axis in rig.axes:
         command[:, axis] = np.tile(multisine(random, level_n / len(rig.axes) ** 0.5, FRESH_PERIOD), FRESH_PERIODS)

@@ -79,9 +79,9 @@ def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray
         mujoco.mj_forward(model, data)
         acceleration[k], position[k] = data.qacc[handle], data.qpos[handle]
         if part:
-            data.ctrl[:] = _at(command, k - whole - 1)
+            data.ctrl[:] = _command_at(command, k - whole - 1)
             mujoco.mj_step(model, data, part)
-        data.ctrl[:] = _at(command, k - whole)
+        data.ctrl[:] = _command_at(command, k - whole)
         mujoco.mj_step(model, data, STEPS - part)
     if not (np.isfinite(acceleration).all() and np.abs(position).max() < 1.0):
         raise ValueError("the device of the second engine ran away")
@@ -93,7 +93,7 @@ def with_delay(bench: MujocoBench, delay_s: float) -> MujocoBench:
     return replace(bench, delay_s=max(round(delay_s / STEP_S), 1) * STEP_S)
 
 
-def _at(command: FloatArray, sample: int) -> FloatArray:
+def _command_at(command: FloatArray, sample: int) -> FloatArray:
     return command[sample] if sample >= 0 else np.zeros(3)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.concealed_effect import EffectContext, Values
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.draw_case import (
     EFFECTS,
@@ -21,7 +22,6 @@ from study.evaluation.challenge.draw_case import (
     visibility,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
-from study.evaluation.challenge.hidden import EffectContext, Values
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.second_engine.mujoco_bench import MujocoBench, bare, linear, simulate_motion, with_delay
@@ -74,7 +74,7 @@ def draw_mujoco_case(
     return Case(recording, as_model(name, known, tolerance, rig.axes), tuple(truth), again, adds)
 
 
-def _at(of: FloatArray, axis: int, value: float) -> FloatArray:
+def _set_axis(of: FloatArray, axis: int, value: float) -> FloatArray:
     changed = of.copy()
     changed[axis] += value
     return changed
@@ -111,16 +111,16 @@ def _hand(bench: MujocoBench, axis: int, values: Values) -> MujocoBench:
 
 
 BUILDERS: dict[str, Build] = {
-    "coulomb_friction": lambda b, axis, v: replace(b, friction_n=_at(b.friction_n, axis, v["level"])),
-    "viscous_damping": lambda b, axis, v: replace(b, damping=_at(b.damping, axis, v["damping"])),
-    "added_mass": lambda b, axis, v: replace(b, mass_kg=_at(b.mass_kg, axis, v["mass"])),
-    "constant_force": lambda b, axis, v: replace(b, force_n=_at(b.force_n, axis, v["force"])),
+    "coulomb_friction": lambda b, axis, v: replace(b, friction_n=_set_axis(b.friction_n, axis, v["level"])),
+    "viscous_damping": lambda b, axis, v: replace(b, damping=_set_axis(b.damping, axis, v["damping"])),
+    "added_mass": lambda b, axis, v: replace(b, mass_kg=_set_axis(b.mass_kg, axis, v["mass"])),
+    "constant_force": lambda b, axis, v: replace(b, force_n=_set_axis(b.force_n, axis, v["force"])),
     "end_stop": _stop,
     "backlash": lambda b, axis, v: replace(b, play=(axis, v)),
     "extra_mode": _mode,
     "hand_impedance": _hand,
-    "force_gain": lambda b, axis, v: replace(b, gain=_at(b.gain, axis, v["gain"] - 1.0)),
-    "force_saturation": lambda b, axis, v: replace(b, limit_n=_at(b.limit_n, axis, v["limit"])),
+    "force_gain": lambda b, axis, v: replace(b, gain=_set_axis(b.gain, axis, v["gain"] - 1.0)),
+    "force_saturation": lambda b, axis, v: replace(b, limit_n=_set_axis(b.limit_n, axis, v["limit"])),
     "amplifier_lag": lambda b, axis, v: replace(b, lag_s=v["time_constant"]),
     "transport_delay": lambda b, axis, v: with_delay(b, v["delay"]),
 }

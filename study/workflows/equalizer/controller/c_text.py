@@ -18,7 +18,7 @@ GROUP = 4
 
 
 def header_text(controller: RealtimeController, written_for: tuple[str, ...]) -> str:
-    """written_for: lines that describe the model; they become a comment."""
+    """The C header of an exported controller. written_for: lines that describe the model; they become a comment."""
     comment = "\n".join(f"/* {line.replace('*/', '* /')} */" for line in written_for)
     return _source("controller.h").replace("@TABLES@", f"{comment}\n\n{_sizes(controller)}\n\n{_tables(controller)}")
 

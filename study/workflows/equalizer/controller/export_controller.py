@@ -1,4 +1,4 @@
-"""From a model file to C sources of its controller."""
+"""`hapteq export-controller`: C sources of the real-time controller of an identified model."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +23,7 @@ TITLE = "The controller was not exported"
 LONGEST_ROWS = 5000
 """Longest transient in rows: every row is 130 numbers for a model of order 26, and a compiler reads them all."""
 LONGEST_PREVIEW_S = 2.0
+"""Longest preview that is accepted (s)."""
 TRY = "Such as --preview 200 --cap 3."
 
 
@@ -72,7 +73,7 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
 
 
 def controller_settings(weight: float, preview_s: float, cap_n: float) -> RealtimeSettings:
-    """Raises StudyError for what no loop can run."""
+    """Settings of the real-time controller from the order. Raises StudyError for what no loop can run."""
     if not preview_s <= LONGEST_PREVIEW_S:
         raise _refusal(f"A preview of {preview_s:g} s was asked for; {LONGEST_PREVIEW_S:g} s is the longest.", TRY)
     try:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance import actuator_twins
+from analysis.diagnosis.balance import actuator_equivalents
 from analysis.diagnosis.balance.command_laws import AS_COMMANDED, neighbours_of
 
 
@@ -220,7 +220,7 @@ def test_a_law_of_the_command_is_tried_in_order_and_never_twice():
 @pytest.mark.parametrize("inertia", [True, False])
 def test_laws_behind_a_dead_band_in_doubt_are_not_named(rubbing_dead_band, monkeypatch, inertia):
     balance = rubbing_dead_band
-    monkeypatch.setattr(actuator_twins, "_has_inertia", lambda regression, laws: inertia)
-    doubted = actuator_twins.doubt_laws_of_actuator(balance)
+    monkeypatch.setattr(actuator_equivalents, "_has_inertia", lambda regression, laws: inertia)
+    doubted = actuator_equivalents.doubt_laws_of_actuator(balance)
     assert set(named(doubted)) == ({"force_deadband", "coulomb_friction"} if inertia else set())
     assert len(doubted.laws) == len(balance.laws)

@@ -115,7 +115,7 @@ def test_all_laws_together_leave_no_more_than_the_truth_and_noise_alone_stays(re
 def test_an_axis_has_no_mass_and_no_damping_below_zero(regression):
     turned = replace(
         regression, force=tuple(-f for f in regression.force),
-        fit=tuple(replace(b, pull=-b.pull) for b in regression.fit),
+        fit=tuple(replace(b, cross=-b.cross) for b in regression.fit),
     )  # fmt: skip
     columns = turned.columns_of(())
     assert lstsq(turned, columns, turned.fit)[1] < 0

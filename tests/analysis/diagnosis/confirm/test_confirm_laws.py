@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.stiffness_laws import _stop_values
+from analysis.diagnosis.balance.laws import _stop_values
 from analysis.diagnosis.confirm import confirm_laws as by_balance
 from analysis.diagnosis.confirm.confirm_laws import (
     ONLY_BESIDE_CALIBRATION,

@@ -8,7 +8,7 @@ import pytest
 
 from analysis.diagnosis.balance.condition_laws import _formula
 from analysis.diagnosis.balance.motion import Condition
-from analysis.diagnosis.data.recorded_conditions import under_conditions
+from analysis.diagnosis.data.recorded_conditions import effects_under_conditions
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.prepare_recordings import prepare
 from analysis.diagnosis.result.wording import effect_title
@@ -100,7 +100,7 @@ def test_a_model_with_such_a_law_is_played_with_the_recording_s_condition_and_no
     recording = rubbing_mass(np.zeros(SAMPLES), np.where(TIME_S < 4, 300.0, 301.0), 1)
     placed = place_recorded_effects(model, recording)
     command = recording.command.samples
-    bound = simulate_mechanism(model, command, RATE_HZ, under_conditions(placed, recording))
+    bound = simulate_mechanism(model, command, RATE_HZ, effects_under_conditions(placed, recording))
     without = simulate_mechanism(plain, command, RATE_HZ)
     same = int(4 * RATE_HZ)
     np.testing.assert_allclose(bound.response[:same], without.response[:same], atol=1e-9)

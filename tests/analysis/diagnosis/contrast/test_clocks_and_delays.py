@@ -11,13 +11,19 @@ from analysis.diagnosis.contrast.actuator_faults import AROUND, delays_to_try
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
 from analysis.diagnosis.contrast.bases import bases_of, unexplained_share
 from analysis.diagnosis.contrast.compare import compare
+from analysis.diagnosis.contrast.compared_base import (
+    FEWEST_ROWS,
+    REACH,
+    ComparedBase,
+    compare_base,
+    rows_with_fault_undone,
+)
 from analysis.diagnosis.contrast.decide import decide
 from analysis.diagnosis.contrast.fault import Rows
 from analysis.diagnosis.contrast.interpolation import noise_kept, resample, shift_samples
 from analysis.diagnosis.contrast.likely_delays import likely_clock_rates, likely_delays_s
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.sensor_faults import sensor_faults
-from analysis.diagnosis.contrast.stream import FEWEST_ROWS, REACH, Stream, rows_with_fault_undone, stream_of
 from analysis.diagnosis.settings import LEAST_FAULT_GAIN
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -89,7 +95,7 @@ def cut(recording: Recording, *lengths: int) -> list[Recording]:
 def suggested_delay_s(faulty: list[Recording], step: int = 1, period: int = 6000) -> float:
     """The middle of the delays that are suggested for these recordings; 0 if none is."""
     clean = split_into_parts([oscillator(1, 0, period)[0]])
-    found = likely_delays_s([stream_of(AutoregressiveBase(0, 24, step, 1), clean, split_into_parts(faulty))])
+    found = likely_delays_s([compare_base(AutoregressiveBase(0, 24, step, 1), clean, split_into_parts(faulty))])
     return float(np.median(found)) if found else 0.0
 
 
@@ -120,9 +126,9 @@ def by_other_clock(recording: Recording, rate: float, begins: tuple[int, ...] = 
     return replace(recording, response=replace(recording.response, samples=resample(read, at)[:, None]))
 
 
-def streams_beside(faulty: list[Recording], period: int = 6000) -> list[Stream]:
+def streams_beside(faulty: list[Recording], period: int = 6000) -> list[ComparedBase]:
     clean = split_into_parts([oscillator(1, 0, period)[0]])
-    return [stream_of(AutoregressiveBase(0, 24, 1, 1), clean, split_into_parts(faulty))]
+    return [compare_base(AutoregressiveBase(0, 24, 1, 1), clean, split_into_parts(faulty))]
 
 
 @pytest.mark.parametrize("rate", [-0.03, -0.004, 0.02])
@@ -147,8 +153,8 @@ def test_no_clock_rate_is_suggested_for_a_clock_in_order(period):
 @pytest.mark.parametrize("rows", [20, 2 * REACH + 3])
 def test_parts_that_are_hardly_longer_than_the_filter_suggest_nothing(rows):
     """Their blocks were empty, and their times no numbers."""
-    (stream,) = streams_beside([oscillator(2, 40)[0]])
-    short = replace(stream, other=replace(stream.other, rows=tuple(part[:rows] for part in stream.other.rows)))
+    (compared,) = streams_beside([oscillator(2, 40)[0]])
+    short = replace(compared, other=replace(compared.faulty, rows=tuple(part[:rows] for part in compared.faulty.rows)))
     assert likely_clock_rates([short]) == () and likely_delays_s([short]) == ()
 
 
@@ -230,19 +236,19 @@ def test_a_smooth_response_is_predicted_as_well_as_its_past_allows():
     """Products of readings that are so alike left three times the error."""
     late, innovation = oscillator(1, 400)
     parts = split_into_parts([late])
-    stream = stream_of(AutoregressiveBase(0, 24, 1, 1), parts, parts)
-    assert stream.clean.scale * stream.columns[0] == pytest.approx(innovation, rel=0.1)
-    assert unexplained_share(stream.base, parts) == pytest.approx(innovation, rel=0.1)
+    compared = compare_base(AutoregressiveBase(0, 24, 1, 1), parts, parts)
+    assert compared.clean.scale * compared.columns[0] == pytest.approx(innovation, rel=0.1)
+    assert unexplained_share(compared.base, parts) == pytest.approx(innovation, rel=0.1)
 
 
 def test_sensor_faults_of_a_response_with_hardly_any_noise_can_be_undone():
     """Errors of 1e-8 of its size are beyond products of values in double precision, and not of second differences."""
     parts = split_into_parts([oscillator(2)[0]])
-    stream = stream_of(AutoregressiveBase(0, 24, 1, 1), split_into_parts([oscillator(1)[0]]), parts)
+    compared = compare_base(AutoregressiveBase(0, 24, 1, 1), split_into_parts([oscillator(1)[0]]), parts)
     gains = [fault for fault in sensor_faults(0, "x", parts, Rows(1, (), 0.0, ())) if fault.effect == "sensor_gain"]
     for variant in gains[0].variants:
-        undone = rows_with_fault_undone(stream, stream.other, gains[0], variant)
-        assert stream.grams(stream.other, undone).is_well_conditioned(variant)
+        undone = rows_with_fault_undone(compared, compared.faulty, gains[0], variant)
+        assert compared.grams(compared.faulty, undone).is_well_conditioned(variant)
 
 
 def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():
@@ -256,4 +262,4 @@ def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():
     ]
     (base,), _ = next(bases_of(parts[0], parts[1]))
     assert isinstance(base, AutoregressiveBase) and base.step > 1
-    assert stream_of(base, parts[0], parts[1]).other.count >= FEWEST_ROWS
+    assert compare_base(base, parts[0], parts[1]).faulty.count >= FEWEST_ROWS

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.contrast.bases import bases_of
+from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, UndoneRows, compare_base
 from analysis.diagnosis.contrast.decide import decide
 from analysis.diagnosis.contrast.part import split_into_parts
-from analysis.diagnosis.contrast.stream import REACH, Stream, Undone, stream_of
 
 
 @pytest.fixture(scope="module")
-def stream(rig) -> Stream:
+def compared(rig) -> ComparedBase:
     clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
-    return stream_of(next(bases_of(clean, other))[0][0], clean, other)
+    return compare_base(next(bases_of(clean, other))[0][0], clean, other)
 
 
 def test_the_ends_of_a_part_and_what_lies_beside_a_gap_do_not_count(rig):
     clean = split_into_parts([rig.recording(1)])
     gap = np.arange(rig.COUNT) == 2500
     with_gap = replace(clean[0], known=clean[0].known & ~gap)
-    (mask,) = stream_of(next(bases_of(clean, ()))[0][0], (with_gap,), clean).clean.masks
+    (mask,) = compare_base(next(bases_of(clean, ()))[0][0], (with_gap,), clean).clean.masks
     assert len(mask) == rig.COUNT
     assert not mask[:REACH].any() and not mask[-REACH:].any()
     assert not mask[2500 - REACH : 2501 + REACH].any()
@@ -35,22 +35,22 @@ def test_sparse_losses_leave_most_rows_to_compare_by(lost, rig):
     gone = np.arange(rig.COUNT) % 30 == 0 if lost == "every 30th" else random.random(rig.COUNT) < 0.1
     clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
     lossy = replace(other[0], known=other[0].known & ~gone)
-    compared = stream_of(next(bases_of(clean, other))[0][0], clean, (lossy,))
-    assert compared.other.count > 0.8 * compared.clean.count
+    compared = compare_base(next(bases_of(clean, other))[0][0], clean, (lossy,))
+    assert compared.faulty.count > 0.8 * compared.clean.count
 
 
 def test_a_side_with_too_few_rows_is_not_compared(rig):
     clean, other = split_into_parts([rig.recording(1)]), split_into_parts([rig.recording(2)])
     bare = replace(other[0], known=np.arange(rig.COUNT) < 60)
     with pytest.raises(ValueError, match="too few rows"):
-        stream_of(next(bases_of(clean, other))[0][0], clean, (bare,))
+        compare_base(next(bases_of(clean, other))[0][0], clean, (bare,))
 
 
-def test_what_undoing_a_fault_loses_stays_as_it_was(stream):
-    rows = tuple(np.zeros_like(part) for part in stream.other.rows)
+def test_what_undoing_a_fault_loses_stays_as_it_was(compared):
+    rows = tuple(np.zeros_like(part) for part in compared.faulty.rows)
     half = tuple(np.arange(len(part)) < len(part) // 2 for part in rows)
-    blocks = stream.grams(stream.other, [Undone(rows, half)]).undo_sizes(np.ones(1))
-    plain = stream.grams(stream.other, []).blocks
+    blocks = compared.grams(compared.faulty, [UndoneRows(rows, half)]).undo_sizes(np.ones(1))
+    plain = compared.grams(compared.faulty, []).blocks
     assert np.allclose(blocks[:8], plain[:8])
     assert np.abs(blocks[-8:]).max() < 1e-3 * np.abs(plain[-8:]).max()
 

@@ -119,16 +119,16 @@ def test_a_step_within_bounds_is_the_best_one():
     random = np.random.default_rng(5)
     for _ in range(30):
         rows = random.normal(size=(12, 4))
-        products, pull = rows.T @ rows, rows.T @ random.normal(size=12)
+        products, rhs = rows.T @ rows, rows.T @ random.normal(size=12)
         low, high = -random.uniform(0, 0.3, 4), random.uniform(0, 0.3, 4)
-        step = bounded_step(products, pull, low, high)
+        step = bounded_step(products, rhs, low, high)
         assert ((step >= low - 1e-12) & (step <= high + 1e-12)).all()
-        free = np.linalg.solve(products, pull)
+        free = np.linalg.solve(products, rhs)
         if ((free >= low) & (free <= high)).all():
             assert step == pytest.approx(free)
 
-        def cost(at, products=products, pull=pull):
-            return at @ products @ at - 2 * pull @ at
+        def cost(at, products=products, rhs=rhs):
+            return at @ products @ at - 2 * rhs @ at
 
         nothing = cost(np.zeros(4))
         assert cost(step) <= nothing + 1e-12

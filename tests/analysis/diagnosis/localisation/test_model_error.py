@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.diagnosis.localisation.model_error import adjust_for_model_error, model_error
+from analysis.diagnosis.localisation.mismatch_maps import adjust_for_model_error, model_error
 
 LINES, FREEDOM, SNR = 20.0, 2000.0, 1e6
 LEVELS, OCTAVES_HZ = (0.5, 1.0, 2.0), (2.0, 4.0, 8.0, 16.0, 32.0, 64.0)

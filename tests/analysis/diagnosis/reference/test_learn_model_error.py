@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, combine, hypothesis_of_claim
-from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned, learned_sentence
+from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned, clean_floor_sentence
 from analysis.diagnosis.reference.learn_model_error import (
     learn_model_error,
     require_alike,
@@ -122,9 +122,9 @@ def test_recordings_that_can_only_be_compared_otherwise_teach_nothing():
 
 
 def test_what_was_learned_is_reported_and_where_it_is_much_that_too():
-    assert learned_sentence(CleanFloor(), ("ax",)) == ""
-    little = learned_sentence(CleanFloor(channels=(0.1, 0.004), recordings=2), ("ax", "x"))
+    assert clean_floor_sentence(CleanFloor(), ("ax",)) == ""
+    little = clean_floor_sentence(CleanFloor(channels=(0.1, 0.004), recordings=2), ("ax", "x"))
     assert "from 2 clean recordings: ax 10 % and x 0.4 % of the channel's signal" in little
     assert "times 1.5" in little
     assert "That is much" not in little
-    assert "That is much" in learned_sentence(CleanFloor(channels=(0.4,), recordings=1), ("ax",))
+    assert "That is much" in clean_floor_sentence(CleanFloor(channels=(0.4,), recordings=1), ("ax",))

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.confirm.fitting_measures import ABOUT_MEAN, choose_fitting_measure
-from analysis.diagnosis.data.operating_point import about_operating_point
+from analysis.diagnosis.confirm.fitting_measures import ABOUT_MEAN, about_operating_point, choose_fitting_measure
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal

@@ -13,7 +13,7 @@ from protocols.procedure.staircase import begin, is_finished, step
 from protocols.trial import Phase
 from study.participants.delivered_feeler import MPS2_PER_N, DeliveredFeeler
 from study.participants.direction_feeler import DirectionFeeler
-from study.participants.observer import Felt
+from study.participants.observer import PerceivedStimulus
 from study.session.stimulus.delivered import Delivered
 from tests.analysis.conftest import PUBLISHED
 
@@ -38,7 +38,7 @@ def slow_run(delivery, threshold_n, seed):
         along, across, harmonics = (np.interp(state.level_db, table[:, 0], table[:, place]) for place in (1, 2, 3))
         flawless = PER_NEWTON * level_n
         measured = Delivered(along * flawless, across * flawless, 0.1, harmonics * flawless)
-        felt = Felt(0, trial, 0, Phase.TEST, HZ, level_n, direction, trial, delivered=measured)
+        felt = PerceivedStimulus(0, trial, 0, Phase.TEST, HZ, level_n, direction, trial, delivered=measured)
         right = random.random_sample() < observer.share_right(felt)
         found.append((state.level_db, direction, right))
         state = step(PUBLISHED, state, bool(right))

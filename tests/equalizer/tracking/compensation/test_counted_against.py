@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.effects.turned_commands import with_turned_commands
+from equalizer.effects.command_sign import with_reversed_commands
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-from equalizer.tracking.compensation.known_physics import compensate
+from equalizer.tracking.compensation.effect_compensation import compensate
 from equalizer.tracking.compensation.without_effects import subtract_effects
 from equalizer.tracking.feedforward.band_part import band_part
 
@@ -28,7 +28,7 @@ EFFECTS = (
 def physics(turned: bool) -> MechanicalModel:
     eye = np.eye(3)
     model = MechanicalModel("device", "acceleration", 0.28 * eye, eye, eye, eye, eye, effects=EFFECTS)
-    return with_turned_commands(model, WAY, FORCES, ACCELERATIONS) if turned else model
+    return with_reversed_commands(model, WAY, FORCES, ACCELERATIONS) if turned else model
 
 
 def shaken(seed: int) -> np.ndarray:

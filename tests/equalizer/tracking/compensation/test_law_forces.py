@@ -8,7 +8,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-from equalizer.tracking.compensation.known_physics import compensate
+from equalizer.tracking.compensation.effect_compensation import compensate
 from equalizer.tracking.compensation.law_forces import COMMANDS, FOLDED, REMEMBERS, SENSED, SEVERAL
 from equalizer.tracking.compensation.without_effects import subtract_effects
 

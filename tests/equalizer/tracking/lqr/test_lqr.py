@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from equalizer.tracking.lqr.lqr import costate_feedforward, periodic_state, ringing_weight, stored_gains, track
+from equalizer.tracking.lqr.lqr import costate_feedforward, free_decay_weight, periodic_state, stored_gains, track
 from equalizer.tracking.lqr.padding import simulate_from_rest
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
@@ -49,8 +49,8 @@ def test_a_fade_in_that_is_drawn_to_the_loop_s_state_leaves_no_transient(device_
     steady = simulate_from_rest(problem, np.tile(loop, (100, 1)))[-100:]
     wanted = np.tile(steady, (6, 1)) * np.minimum(1, time_s / 0.3)[:, None]
     free = track(stored_gains(problem, 600), wanted)
-    drawn = track(stored_gains(problem, 600, ringing_weight(problem)), wanted, final_state=start)
-    held = track(stored_gains(problem, 600, 1e3 * ringing_weight(problem)), wanted, final_state=start)
+    drawn = track(stored_gains(problem, 600, free_decay_weight(problem)), wanted, final_state=start)
+    held = track(stored_gains(problem, 600, 1e3 * free_decay_weight(problem)), wanted, final_state=start)
 
     def ringing(faded) -> float:
         after = simulate_from_rest(problem, np.vstack([faded.forces, np.tile(loop, (10, 1))]))[600:]
@@ -65,7 +65,7 @@ def test_the_ringing_weight_is_all_that_is_still_to_come(problem_of):
     for _ in range(3000):
         outputs.append(problem.C @ state)
         state = problem.A @ state
-    assert x @ ringing_weight(problem) @ x == pytest.approx(np.sum(np.square(outputs)), rel=1e-9)
+    assert x @ free_decay_weight(problem) @ x == pytest.approx(np.sum(np.square(outputs)), rel=1e-9)
 
 
 def test_a_periodic_state_comes_round_again(problem_of):
@@ -76,7 +76,7 @@ def test_a_periodic_state_comes_round_again(problem_of):
     assert x == pytest.approx(start, abs=1e-12)
 
 
-@pytest.mark.parametrize("question", [ringing_weight, lambda problem: periodic_state(problem, np.ones((3, 3)))])
+@pytest.mark.parametrize("question", [free_decay_weight, lambda problem: periodic_state(problem, np.ones((3, 3)))])
 def test_what_never_settles_is_refused(model_of, question):
     model = model_of(4, 0)
     numbers = model.parameters.copy()

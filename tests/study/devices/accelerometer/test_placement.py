@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.signals.lockin import phasors
-from study.devices.accelerometer.history import Stretch
+from study.devices.accelerometer.history import ArrivedSamples
 from study.devices.accelerometer.placement import HALF_PERIODS, place, resample
 
 TICK_HZ = 1000.0
@@ -12,7 +12,9 @@ START_S = 5e4
 """Of the host's clock: it has run for long, and must not lose digits by that."""
 
 
-def board(rate_hz: float, drift_ppm: float, signal, seed: int = 1, seconds: float = 20.0) -> tuple[Stretch, np.ndarray]:
+def board(
+    rate_hz: float, drift_ppm: float, signal, seed: int = 1, seconds: float = 20.0
+) -> tuple[ArrivedSamples, np.ndarray]:
     """What arrived of signal(host_s), and its values; packets wait for frames of 1 ms, then for the host."""
     random = np.random.default_rng(seed)
     true_s = START_S + np.arange(round(seconds * rate_hz)) / rate_hz
@@ -24,7 +26,7 @@ def board(rate_hz: float, drift_ppm: float, signal, seed: int = 1, seconds: floa
     arrived_s = np.maximum.accumulate(arrived_s)
     zeros = np.zeros(len(true_s))
     values = signal(true_s)[:, None] * np.ones(3)
-    return Stretch(device_s, zeros, values, device_s, zeros, arrived_s), values
+    return ArrivedSamples(device_s, zeros, values, device_s, zeros, arrived_s), values
 
 
 def tone(frequency_hz: float, phase: float = 0.7):
@@ -94,7 +96,7 @@ def test_a_few_lost_packets_change_little_and_a_gap_leaves_ticks_without_a_value
     stretch, values = board(2000.0, 50.0, tone(45.0))
     lost = random.random(len(values)) < 0.05
     lost[22_000:22_040] = True  # 20 ms, at 11 s
-    kept = Stretch(stretch.device_s[~lost], stretch.restarts[~lost], values[~lost], *_arrivals(stretch))
+    kept = ArrivedSamples(stretch.device_s[~lost], stretch.restarts[~lost], values[~lost], *_arrivals(stretch))
     placed = place(kept, values[~lost], TICKS_S, TICK_HZ).values
     known = np.isfinite(placed[:, 0])
     around = np.abs(TICKS_S - (START_S + 11.01)) < 0.01 + HALF_PERIODS / TICK_HZ
@@ -112,7 +114,7 @@ def test_a_board_that_began_anew_is_placed_by_each_of_its_clocks():
     restarts = anew.astype(float)
     silent = np.abs(stretch.device_s - stretch.device_s[0] - 11.0) < 0.1
     keep = ~silent
-    again = Stretch(
+    again = ArrivedSamples(
         device_s[keep], restarts[keep], values[keep], device_s[keep], restarts[keep], stretch.arrived_s[keep]
     )
     placed = place(again, values[keep], TICKS_S, TICK_HZ).values
@@ -120,7 +122,7 @@ def test_a_board_that_began_anew_is_placed_by_each_of_its_clocks():
     assert 0.2 / 2 < 1 - known.mean() < 0.3 / 2
     assert late_of(found_tone(placed, TICKS_S, 45.0)) == pytest.approx(LEAST_DELAY_S[2000.0], abs=6e-5)
     # The negative control: as if it were one clock, nothing of the second part is where it belongs.
-    one_clock = Stretch(np.sort(device_s[keep]), 0 * restarts[keep], *_of(again))
+    one_clock = ArrivedSamples(np.sort(device_s[keep]), 0 * restarts[keep], *_of(again))
     assert abs(np.angle(found_tone(place(one_clock, values[keep], TICKS_S, TICK_HZ).values, TICKS_S, 45.0)) - 0.7) > 0.1
 
 
@@ -131,9 +133,9 @@ def test_a_clock_that_was_heard_for_less_than_a_second_places_nothing():
     assert np.isnan(resample(np.zeros(0), np.zeros((0, 3)), TICKS_S, TICK_HZ)).all()
 
 
-def _arrivals(stretch: Stretch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _arrivals(stretch: ArrivedSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return stretch.last_device_s, stretch.last_restarts, stretch.arrived_s
 
 
-def _of(stretch: Stretch) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _of(stretch: ArrivedSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return stretch.raw, np.sort(stretch.last_device_s), 0 * stretch.last_restarts, stretch.arrived_s

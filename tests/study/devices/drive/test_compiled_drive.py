@@ -18,7 +18,7 @@ from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.governor import cells
 from study.devices.governor.governor import Governor
 from study.devices.native import CLOCK, SLEEP, SYSTEM_SIZE, SharedLock, address_of, call_int, system_calls
-from study.devices.rig import READING_SIZE, Halves
+from study.devices.rig import READING_SIZE, CompiledIo
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 
@@ -147,7 +147,7 @@ class ScriptedRig:
         self._calls = np.append(system_calls(SharedLock()), address_of(clock.work))
         self._calls[CLOCK], self._calls[SLEEP] = address_of(clock.now), address_of(clock.wait)
         self._own, self._samples = np.array([float(fails_at), 0.0]), np.zeros((1, 1))
-        self.halves = Halves(tremble, work, self._calls, self._own, self._samples, lambda code: OSError(code))
+        self.halves = CompiledIo(tremble, work, self._calls, self._own, self._samples, lambda code: OSError(code))
 
     def sense(self):
         reading = np.empty(READING_SIZE)
@@ -169,7 +169,7 @@ class ScriptedRig:
 def played(rigs, monkeypatch):
     """What a drive told whose thread does nothing: the test takes its place."""
     ended = threading.Event()
-    monkeypatch.setattr(RealtimeDrive, "_attend", lambda self: ended.wait())
+    monkeypatch.setattr(RealtimeDrive, "_run_ticks", lambda self: ended.wait())
 
     def play(clock: ScriptedTime, fails_at: int, compiled: bool) -> tuple:
         rig = ScriptedRig(rigs, clock, fails_at)
@@ -179,7 +179,7 @@ def played(rigs, monkeypatch):
         assert drive.start(lambda: governor.begin_hold(rigs.sine(2.0, fade_s=0.01)))
         governor.settings[cells.WATCHDOG_TICKS] = governor.state[cells.LONGEST] = np.inf
         clock.at_end = governor.ask_stop
-        drive._course[WANTED] = 0.0
+        drive._loop_state[WANTED] = 0.0
         calls = 0
         while governor.moving:
             calls += 1
@@ -187,7 +187,7 @@ def played(rigs, monkeypatch):
                 drive._wait_for_tick()
                 drive.pump(clock.now_s())
         assert (calls < 3) == compiled  # all of it in a call, or a tick each
-        arrays = (governor.state, governor.buffer, governor.ring, governor.force, drive._course[STARTED_S:DUE_S])
+        arrays = (governor.state, governor.buffer, governor.ring, governor.force, drive._loop_state[STARTED_S:DUE_S])
         return *(each.tobytes() for each in arrays), governor.health(), repr(runner.failure), clock.time_s
 
     yield play

@@ -9,7 +9,7 @@ import pytest
 
 from study.cli.main import main
 from study.devices.clock import RealClock
-from study.devices.force_dimension import force_proof, loop_cells, watchdog_proof
+from study.devices.force_dimension import force_limit_check, loop_cells, watchdog_check
 from study.devices.force_dimension.acceptance import VALID_FOR, acceptance_file
 from study.devices.governor import cells
 from study.devices.opening import accept_device, open_device
@@ -39,7 +39,7 @@ def test_a_device_without_an_acceptance_record_opens_for_no_hand(locked, rigs, m
     assert "There is no acceptance of it" in refused(rigs)
     assert locked.safe and locked.get("opened") == 0
     locked.set("watchdog_stretch", 20)  # a busy computer may be late for the watchdog itself
-    monkeypatch.setattr(watchdog_proof, "MARGIN_S", 1.0)
+    monkeypatch.setattr(watchdog_check, "MARGIN_S", 1.0)
     settings = replace(rigs.SETTINGS, hand_on_handle=False)
     with contextlib.closing(open_device("omega3", settings, RealClock(), 1, own_process=False)):
         assert locked.get("force_on")
@@ -81,9 +81,9 @@ def without_spring(rigs):
 def patient(stub, monkeypatch):
     """The firmware waits longer, since the computer of the tests is late; so does the proof."""
     stub.set("watchdog_stretch", 10)
-    for module in (watchdog_proof, force_proof):
+    for module in (watchdog_check, force_limit_check):
         monkeypatch.setattr(module, "MARGIN_S", 0.7)
-    monkeypatch.setattr(force_proof, "WITHHELD_S", 2.0)
+    monkeypatch.setattr(force_limit_check, "PAUSE_S", 2.0)
     return stub
 
 
@@ -121,13 +121,13 @@ CAPS = {
 @pytest.mark.parametrize("said", CAPS)
 def test_a_device_that_gets_more_than_its_cap_is_not_accepted(locked, patient, rigs, monkeypatch, said):
     """Each layer by itself; and one that tells of no force proves nothing."""
-    prove = force_proof.prove_cap_holds
+    prove = force_limit_check.check_cap_holds
 
     def broken(device, rig) -> float:
         CAPS[said](device, rig, locked)
         return prove(device, rig)
 
-    monkeypatch.setattr(force_proof, "prove_cap_holds", broken)
+    monkeypatch.setattr(force_limit_check, "check_cap_holds", broken)
     with pytest.raises(DeviceError, match="was not accepted") as no:
         accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
     assert said in no.value.happened
@@ -145,13 +145,13 @@ def test_what_admission_refuses_is_never_held_with_a_hand_on_the_handle(stub, ri
 @pytest.mark.real_time
 def test_a_device_whose_force_stays_on_is_not_accepted(locked, patient, rigs, monkeypatch):
     """Its watchdog passes the proof at opening, and fails under force."""
-    prove = force_proof.prove_force_goes
+    prove = force_limit_check.check_force_vanishes
 
     def broken(device, rig) -> float:
         locked.set("watchdog_works", 0)
         return prove(device, rig)
 
-    monkeypatch.setattr(force_proof, "prove_force_goes", broken)
+    monkeypatch.setattr(force_limit_check, "check_force_vanishes", broken)
     with pytest.raises(DeviceError, match="was not accepted"):
         accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
     assert not acceptance_file().exists()

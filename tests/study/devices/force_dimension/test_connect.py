@@ -109,7 +109,7 @@ def test_a_library_without_a_function_is_too_old(another, vendor, opened, tmp_pa
         ({"calibrated": 0}, "not calibrated. It does not know where its handle is. Push the handle gently"),
         ({"force_enables": 0}, "takes no forces"),
         ({"write_fails": 2}, "dhdSetForce: communication error"),
-        ({"watchdog_works": 0}, "watchdog is not proved"),
+        ({"watchdog_works": 0}, "watchdog failed its test"),
         ({"off_by": 6}, "dead-man"),
         ({"watchdog_settable": 0}, "no watchdog of its own"),
     ],

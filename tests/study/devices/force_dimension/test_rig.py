@@ -10,8 +10,8 @@ import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
-from study.devices.force_dimension.halves import SCALED_FOR, STALE_FOR
 from study.devices.force_dimension.library import LibraryError
+from study.devices.force_dimension.tick_io import SCALED_FOR, STALE_FOR
 from study.devices.rig import ACCELERATION, POSITION, SENSOR_CLIPPED, TRUE_ACCELERATION
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError

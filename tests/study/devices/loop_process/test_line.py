@@ -26,16 +26,16 @@ def test_an_answer_that_comes_together_with_an_interruption_is_kept(pipe, monkey
     line, theirs = pipe
     call = line.begin("ask")
     theirs.send((VALUE, 7))
-    take = call._next
+    take = call._next_progress
 
     def interrupted(*patience) -> None:
         take(*patience)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(call, "_next", interrupted)
+    monkeypatch.setattr(call, "_next_progress", interrupted)
     with pytest.raises(KeyboardInterrupt):
         call.answer(20.0)
-    monkeypatch.setattr(call, "_next", take)
+    monkeypatch.setattr(call, "_next_progress", take)
     assert call.answer(0.0, grace_s=0.0) == 7
 
 
@@ -50,7 +50,7 @@ def test_only_what_carries_much_is_waited_for_longer(pipe, monkeypatch):
             call.hear((VALUE, 7))
         return share
 
-    monkeypatch.setattr(call, "_next", take)
+    monkeypatch.setattr(call, "_next_progress", take)
     assert call.answer(3.0, sending_s=2.0) == 7
     assert waited_s == [5.0, 3.0, 3.0, 5.0]
 
@@ -70,14 +70,14 @@ def test_a_process_that_cannot_be_killed_is_not_said_to_be_gone(monkeypatch):
 def test_a_release_whose_answer_came_with_an_interruption_is_asked_for_again(device, rigs, monkeypatch):
     device.hold(rigs.push())
     device.keep_alive()
-    noted, answered = device._noted, []
+    noted, answered = device._note_health, []
 
     def interrupted(health) -> None:
         answered.append(health)
-        monkeypatch.setattr(device, "_noted", noted)
+        monkeypatch.setattr(device, "_note_health", noted)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(device, "_noted", interrupted)
+    monkeypatch.setattr(device, "_note_health", interrupted)
     with pytest.raises(KeyboardInterrupt):
         device.release()
     assert [device.release().health] == answered

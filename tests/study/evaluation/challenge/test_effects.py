@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from study.evaluation.challenge.concealed_effect import EffectContext
 from study.evaluation.challenge.device import Device, record
 from study.evaluation.challenge.draw_case import DECOYS, EFFECTS
-from study.evaluation.challenge.hidden import EffectContext
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
 NEUTRAL = {
@@ -27,7 +27,7 @@ NEUTRAL = {
     "stiffness_in_time": {"depth": 0.0},
     "skipped_commands": {"every": 0.0},
 }
-"""What `no_inverse` means, where it is not the main number at zero."""
+"""What `no_equalization` means, where it is not the main number at zero."""
 LINEAR = {
     "viscous_damping", "extra_mode", "added_mass", "hand_impedance", "amplifier_lag", "transport_delay", "force_gain",
     "sensor_lag", "sensor_misalignment", "cross_axis_sensitivity", "sensor_gain", "logger_offset",

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from study.evaluation.challenge.concealed_effect import with_cells, with_forces
 from study.evaluation.challenge.device import Device, motion
 from study.evaluation.challenge.drive_plan import RATE_HZ
 from study.evaluation.challenge.friction_kernel import NEGATIVE, POSITIVE, STIFFNESS
 from study.evaluation.challenge.handle_force_kernel import DRAG
-from study.evaluation.challenge.hidden import with_cells, with_forces
 
 
 def exactly(bench, command):

@@ -10,7 +10,7 @@ from study.session.facts.events import (
     TrialMeasured,
     TrialSpoiled,
 )
-from study.session.watching.watching import LiveInfo, watch_view
+from study.session.watching.make_watch_view import LiveInfo, watch_view
 from tests.watched_story import Story, at, place
 
 

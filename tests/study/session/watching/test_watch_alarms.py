@@ -13,7 +13,7 @@ from study.session.facts.events import (
 from study.session.facts.void_reasons import SCREEN_LATE
 from study.session.state.due_trial import Present
 from study.session.state.machine import next_action
-from study.session.watching.watching import LiveInfo, watch_view
+from study.session.watching.make_watch_view import LiveInfo, watch_view
 from tests.watched_story import DEVICE, at, kinds
 
 

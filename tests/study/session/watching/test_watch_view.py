@@ -9,7 +9,7 @@ from study.session.facts.events import (
     SessionInterrupted,
     SessionResumed,
 )
-from study.session.watching.watched import NO_STEADY_PART
+from study.session.watching.followed_session import NO_STEADY_PART
 from tests.watched_story import DEVICE, at
 
 

@@ -16,7 +16,7 @@ from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.log_writer import is_log_locked
 from study.tui.engine.from_engine import Ask, Call, Close, Failed, Finished, Home, Session, Withdrawn
 from study.tui.engine.to_engine import (
-    AskBeside,
+    AskOtherSession,
     Begin,
     LetGo,
     Relay,
@@ -157,7 +157,7 @@ def test_what_cannot_be_begun_is_reported_and_the_engine_continues(screen, order
     assert isinstance(failure, Failed)
     assert "no_such_protocol" in failure.error.happened
     assert failure.path == ""
-    screen.send(AskBeside(order.data, PauseAsked("experimenter")))
+    screen.send(AskOtherSession(order.data, PauseAsked("experimenter")))
     assert isinstance(screen.next(), Failed)
     screen.send(ShowHome(order.data))
     assert isinstance(screen.next(), Home)

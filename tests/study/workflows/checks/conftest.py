@@ -14,11 +14,11 @@ from study.devices.safe import SafeDevice
 from study.store.disk.provenance import sha256_of
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
-from study.workflows.checks.daily_check import Moving, check_on
+from study.workflows.checks.daily_check import MotionCallbacks, check_on
 from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
 
 AS_NEW = {"friction": 0.15, "damping": 1.0, "mode_hz": 60.0, "noise": 0.05}
-QUIET = Moving(lambda notice: None, lambda done: None)
+QUIET = MotionCallbacks(lambda notice: None, lambda done: None)
 
 
 def short():

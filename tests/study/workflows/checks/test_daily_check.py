@@ -14,7 +14,7 @@ from study.devices.opening import device_folder
 from study.errors import DeviceError, UserInterruptError
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
-from study.workflows.checks.daily_check import Moving, check_on, compare_recordings, last_check
+from study.workflows.checks.daily_check import MotionCallbacks, check_on, compare_recordings, last_check
 from study.workflows.checks.device_changes import change_findings
 from study.workflows.checks.examine_setup import Examination
 from tests.study.workflows.checks.conftest import INFO, QUIET, short
@@ -134,7 +134,7 @@ def test_it_is_announced_and_a_no_keeps_the_device_still(two_days, device_like, 
 
     stepped_stub.set("peak_n", 0)
     with device_like(2, {}) as (device, plan), pytest.raises(UserInterruptError):
-        check_on(device, plan, Moving(no, lambda done: None))
+        check_on(device, plan, MotionCallbacks(no, lambda done: None))
     assert stepped_stub.get("peak_n") == 0
 
 
@@ -166,7 +166,7 @@ def test_from_the_acceptance_to_the_first_day_at_the_command_line(device_like, m
 
     monkeypatch.setattr(examine_setup, "examine_setup", fine_setup)
     monkeypatch.setattr(examine_setup, "accept_device", sign)
-    monkeypatch.setattr(daily_check, "_open", opened)
+    monkeypatch.setattr(daily_check, "_open_free_device", opened)
     monkeypatch.setattr(daily_check, "_protocol", short)
     doctor = ["doctor", "--device", "omega3", "--data", str(tmp_path), "--hands-off"]
     assert main([*doctor, "--accept", "Ada"]) == 0

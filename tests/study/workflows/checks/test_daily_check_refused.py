@@ -19,7 +19,7 @@ from study.store.disk.provenance import sha256_of
 from study.store.formats.daily_check_file import DailyCheck, write_daily_check
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks import daily_check, examine_setup
-from study.workflows.checks.daily_check import Moving, check_on, compare_recordings, last_check
+from study.workflows.checks.daily_check import MotionCallbacks, check_on, compare_recordings, last_check
 from study.workflows.checks.device_changes import change_findings
 from study.workflows.checks.examine_setup import Examination, accept
 from tests.study.workflows.checks.conftest import INFO, QUIET
@@ -39,7 +39,7 @@ def test_the_proof_of_the_acceptance_is_announced_and_a_no_keeps_the_device_stil
     monkeypatch.setattr(examine_setup, "record_baseline", lambda *_: ("baselines/a.h5", "0"))
     monkeypatch.setattr(examine_setup, "accept_device", lambda *_: called.append("moved"))
     with pytest.raises(KeyboardInterrupt):
-        accept("omega3", looked, "Ada", Moving(no, lambda done: None))
+        accept("omega3", looked, "Ada", MotionCallbacks(no, lambda done: None))
     assert not called
     assert "No person may hold the handle" in notices[0] and "0.5 N" in notices[0]
 
@@ -139,7 +139,7 @@ def test_what_was_played_otherwise_is_not_compared(two_days, device_like, record
     with device_like(2, {}) as (device, plan):
         other = replace(plan, protocol=replace(plan.protocol, rest_s=0.6))
         with pytest.raises(DeviceError, match="was played by another version of the protocol"):
-            check_on(device, other, Moving(never, lambda done: None))
+            check_on(device, other, MotionCallbacks(never, lambda done: None))
 
 
 def test_a_pass_ends_with_another_acceptance_and_with_a_check_that_broke_off(

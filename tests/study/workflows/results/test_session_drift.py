@@ -8,7 +8,7 @@ from protocols.definition.probes import ProbeSettings
 from protocols.document.dumping import dump_protocol
 from study.devices.safe import SafeDevice
 from study.devices.simulated import layout, omega3
-from study.session.watching.watched import PlayedProbe
+from study.session.watching.followed_session import PlayedProbe
 from study.tui.watch.watch_lines import status
 from study.workflows.results.session_drift import DriftReader
 from study.workflows.views.watch_session import follow

@@ -16,7 +16,7 @@ from study.workflows.session.conduct_session import conduct_new
 
 
 @dataclass
-class Watched:
+class FollowedSession:
     """Notes what is asked of the device and of the disk, in order."""
 
     calls: list[str] = field(default_factory=list)
@@ -50,8 +50,8 @@ class Watched:
 
 
 @pytest.fixture
-def watched(monkeypatch, synchronising_disk) -> Watched:
-    notes = Watched()
+def watched(monkeypatch, synchronising_disk) -> FollowedSession:
+    notes = FollowedSession()
     real_open, real_append, real_fsync = conduct_session.open_device, EventLog.append, os.fsync
 
     def append(log, event) -> None:

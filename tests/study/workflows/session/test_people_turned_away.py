@@ -17,11 +17,11 @@ from study.session.facts.events import FormFilled, PlaceTaken, SessionClosed, Se
 from study.session.views.archive_views import TURNED_AWAY
 from study.session.views.form_views import FormKind, FormReply
 from study.session.views.views import Unanswered
-from study.session.watching.watched import begin_watching, follow
-from study.session.watching.watching import LiveInfo, watch_view
+from study.session.watching.followed_session import begin_watching, follow
+from study.session.watching.make_watch_view import LiveInfo, watch_view
 from study.store.sessions.event_log import read_log
 from study.store.sessions.log_seal import seal_paths
-from study.tui.standing_words import describe
+from study.tui.session_status import describe
 from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed

@@ -15,7 +15,7 @@ from study.errors import StudyError
 from study.regular_file import open_regular
 from study.workflows.views import stream_session as module
 from study.workflows.views.lsl_outlets import MarkerOutlet, source_id
-from study.workflows.views.stream_session import FRESH_S, Beside, measured_offset_s, stream_session
+from study.workflows.views.stream_session import FRESH_S, SideTasks, measured_offset_s, stream_session
 
 OFFSET_S = 1000.25
 
@@ -118,7 +118,7 @@ def test_the_offset_is_noted_at_first_and_when_it_has_changed(tmp_path):
     outlet = Kept(clock)
     drift = 0.6 * module.NOTED_S / module.OFFSET_EVERY_S
     outlet.clock_s = lambda: clock.now + OFFSET_S + drift * (clock.now - 50.0)
-    stream_session(log, outlet, print, clock.now_s, clock.sleep, Beside(noted.append, lambda offset_s: 0))
+    stream_session(log, outlet, print, clock.now_s, clock.sleep, SideTasks(noted.append, lambda offset_s: 0))
     assert len(noted) == 2 and noted[1] - noted[0] == pytest.approx(2 * 0.6 * module.NOTED_S, rel=0.1)
 
 
@@ -128,7 +128,7 @@ def test_lost_ticks_are_a_marker(tmp_path):
     log.write_bytes(b"")
     clock = Clock(log, [b"", b"", line("session_closed", monotonic_s=50.0)])
     outlet = Kept(clock)
-    beside = Beside(lambda offset_s: None, lambda offset_s: lost.pop(0) if lost else 0)
+    beside = SideTasks(lambda offset_s: None, lambda offset_s: lost.pop(0) if lost else 0)
     stream_session(log, outlet, lambda marker: None, clock.now_s, clock.sleep, beside)
     assert {"event": "signals_lost", "ticks": 7} in [marker for marker, _ in outlet.pushed]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from study.evaluation.challenge.law_kernel import law_force
+from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, Sizes
 from study.evaluation.challenge.laws.draw_law import COUNTS, TURN, draw_law, law_case
-from study.evaluation.challenge.laws.hidden_laws import LAW_KINDS, Sizes
 
 SEED = 7
 SIZES = Sizes(0.01, 0.2, 20.0)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from study.evaluation.challenge.bench import draw_bench
+from study.evaluation.challenge.concealed_effect import EffectContext
 from study.evaluation.challenge.device import Device, motion
 from study.evaluation.challenge.draw_case import EFFECTS
 from study.evaluation.challenge.drive_plan import multisine
-from study.evaluation.challenge.hidden import EffectContext
 from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.second_engine import second_engine
 from study.evaluation.challenge.sensor import NOISE_MPS2

@@ -77,7 +77,7 @@ def test_a_model_of_a_handle_without_mass_is_refused(plants, plan, tmp_path, gai
 
 def test_without_a_weight_the_weight_is_named(plan):
     refused = refusal(replace(plan, weight=0.0))
-    assert refused.happened == "With --weight 0 nothing keeps forces finite that the model hardly answers."
+    assert refused.happened == "--weight 0 is too small to keep forces finite where the model hardly moves."
     assert refused.do_now == "Give a weight above zero, such as --weight 0.001."
 
 

@@ -68,5 +68,5 @@ def test_a_model_that_hides_its_amplitude_gets_no_friction_on_top(plants, plan, 
 def test_an_effect_on_an_axis_that_is_not_there_is_refused(plan, tmp_path):
     write_mechanical_model(tmp_path / "f.toml", mechanism(ModelEffect("coulomb_friction", "q", {"level": 0.1})))
     refused = refusal(replace(plan, physics=tmp_path / "f.toml"))
-    assert refused.title == "The known physics do not go with the model"
+    assert refused.title == "The known physics does not fit the model"
     assert "on the axis 'q'" in refused.happened

@@ -1,0 +1,85 @@
+"""Laws of a driven motion that cannot be distinguished from laws of its actuator.
+
+Without reversal, friction is a constant force that must be overcome from rest: a dead band has the same effect, and a
+drag beside it may be the curve of that actuator. Where inertia is negligible, speed follows the command: a drag that
+grows with the speed is then equivalent to a gain that falls with the command, and a dead band to dry friction. Where an
+axis rests as long as its dead band passes no force, dry friction may hold it instead: the two are named as a class.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.balance.judge_laws import Balance
+from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
+from analysis.diagnosis.balance.regression import Regression
+from analysis.diagnosis.balance.structures import SLIDING, Structure, is_better
+from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
+
+DEAD_BAND = "force_deadband"
+EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND: "coulomb_friction"}
+BACKWARDS = "it never moves backwards"
+
+
+def doubt_laws_of_actuator(balance: Balance) -> Balance:
+    """The balance of a driven axis, with the names removed from laws that may as well be its actuator's. Without a law
+    of the command, laws found behind it are not named either."""
+    laws = tuple(_doubt_law(each, balance) for each in balance.laws)
+    through = [each.law.effect for each in balance.named if each.place == NO_COLUMN]
+    if through and not any(each.named and each.place == NO_COLUMN for each in laws):
+        why = f"it was found behind {through[0]}, which these data leave in doubt"
+        laws = tuple(replace(each, why_not=each.why_not or why) for each in laws)
+    return replace(balance, laws=laws)
+
+
+def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
+    regression, effect = balance.search.regression, judged.law.effect
+    if judged.named and effect == DEAD_BAND and judged.place == NO_COLUMN and _rests_within(regression):
+        return replace(judged, alike=tuple(dict.fromkeys((*judged.alike, EQUIVALENT_LAWS[DEAD_BAND]))))
+    if not judged.named or judged.law.channel < 0:
+        return judged
+    if effect in SLIDING and not _reverses(regression, judged.law.channel):
+        return _doubted(judged, DEAD_BAND, BACKWARDS)
+    if effect == "quadratic_damping":
+        has_friction = any(
+            each.law.effect in SLIDING and each.law.channel == judged.law.channel for each in balance.named
+        )
+        if has_friction and not _reverses(regression, judged.law.channel):
+            return _doubted(judged, "force_nonlinearity", BACKWARDS)
+    if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
+        return _doubted(judged, EQUIVALENT_LAWS[effect], "no inertia shows")
+    return judged
+
+
+def _rests_within(regression: Regression) -> bool:
+    """Whether the axis rests in most samples in which its dead band passes no force."""
+    motions, axis, own = regression.motions, regression.axis, regression.beside.own
+    speed = np.concatenate([motion.velocity[motion.fit, own] for motion in motions])
+    force = np.concatenate([motion.force[motion.fit, axis] for motion in motions])
+    moves = speed**2 > STILL_SHARE * np.mean(speed**2)
+    return bool(np.mean(moves[force == 0.0]) < MOVES_MOST_OF_THE_TIME) if np.any(force == 0.0) else False
+
+
+def _doubted(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
+    alike = tuple(dict.fromkeys((twin, *judged.alike)))
+    return replace(judged, alike=alike, why_not=f"these data cannot tell it from {twin}, for {why}")
+
+
+def _reverses(regression: Regression, channel: int) -> bool:
+    """Whether the motion goes both ways beyond the threshold for standstill."""
+    speed = np.concatenate([motion.velocity[motion.fit, channel] for motion in regression.motions])
+    ways = [float(np.sum(np.maximum(way * speed, 0.0) ** 2)) for way in (1.0, -1.0)]
+    return min(ways) > STILL_SHARE * max(ways)
+
+
+def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
+    """Whether a mass reduces the cross-validated error notably, and delays the speed by more than a sample."""
+    columns, own = regression.columns_of(laws), regression.beside.own
+    if regression.mass is not None or not np.isfinite(regression.motions[0].band_hz):
+        return True
+    rest = [column for column in columns if column != own]
+    without, held = (Structure(laws, regression.cross_validated_errors(each)) for each in (rest, columns))
+    weights = regression.weights(columns)
+    mass, damping = (float(weights[columns.index(k)]) for k in (own, len(regression.motions[0].channels) + own))
+    # A shorter time constant cannot be distinguished from the hold of the command.
+    return mass * regression.motions[0].rate_hz > max(damping, 0.0) and is_better(without, held)

@@ -1,0 +1,122 @@
+"""Inverse frequency response of a model: from the positions of its outputs to the forces along its axes.
+
+For each frequency, with s = 2 pi i f, the force u and the coordinates q follow from the position y of the outputs by
+one linear system,
+
+    [M s² + D s + K   -B] [q]   [0]
+    [C                 0] [u] = [y]
+
+Solving it at each of many thousand lines is slow. The solution is a rational function of s whose poles are the model's
+transmission zeros, generalised eigenvalues of the matrix pencil (Emami-Naeini and Van Dooren 1982, Automatica 18:415).
+With the poles known, its partial fraction expansion is fitted to a few lines, and checked at others.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.linalg
+
+from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.signal import ComplexArray, FloatArray
+
+LINES_SOLVED_EACH = 2000
+"""Number of lines up to which the system is solved at each line."""
+LINES_OVER_RANGE, HALF_WIDTHS = 60, np.array([-1.0, 0.0, 1.0])
+"""Lines of the fit: number over the whole range, and places about each pole in its half-widths."""
+HIGHEST_POWER = 4
+"""Highest power of s in the expansion: that of an inertia behind a massless coupling."""
+POLE_LIMIT = 1e3
+"""Ratio to the highest line above which a pole is replaced by a power of s."""
+FIT_TOLERANCE = 1e-8
+"""Largest relative error at lines that were not fitted; above it the system is solved at each line."""
+
+
+def inverse_response(model: MechanicalModel, frequency_hz: FloatArray) -> ComplexArray:
+    """(lines, 2 m, m): from the positions of the model's first m outputs to the forces along the driven axes, and to
+    the axes' positions. Raises numpy.linalg.LinAlgError where these outputs do not determine the model's motion."""
+    n, m = model.coordinates, model.inputs
+    s = 2j * np.pi * frequency_hz[:, None, None]
+    system = np.zeros((len(frequency_hz), n + m, n + m), dtype=np.complex128)
+    system[:, :n, :n] = model.mass * s**2 + model.damping * s + model.stiffness
+    system[:, :n, n:] = -model.input
+    system[:, n:, :n] = model.output[:m]
+    unit_outputs = np.concatenate([np.zeros((n, m)), np.eye(m)])
+    solved = np.linalg.solve(system, np.broadcast_to(unit_outputs.astype(np.complex128), (len(frequency_hz), n + m, m)))
+    return np.concatenate([solved[:, n:], driven_axes(model).T @ solved[:, :n]], axis=1)
+
+
+def fast_inverse_response(
+    model: MechanicalModel, lines: int, highest_hz: float
+) -> Callable[[FloatArray], ComplexArray]:
+    """`inverse_response` as a function of frequency, fast for many lines."""
+    if lines > LINES_SOLVED_EACH and (expansion := _fit_partial_fractions(model, highest_hz)) is not None:
+        return expansion
+    return lambda frequency_hz: inverse_response(model, frequency_hz)
+
+
+def _fit_partial_fractions(model: MechanicalModel, highest_hz: float) -> Callable[[FloatArray], ComplexArray] | None:
+    """The inverse as a partial fraction expansion fitted to a few lines; None where its error between them is too
+    large."""
+    poles = zeros_of(model, 2 * np.pi * POLE_LIMIT * highest_hz)
+    lines_hz, unit, m = _lines_to_fit(poles, highest_hz), 2 * np.pi * highest_hz, model.inputs
+    exact, basis = inverse_response(model, lines_hz), _basis_functions(lines_hz, poles, unit)
+    # Forces and positions are fitted separately, and each line is scaled: entries differ by many orders of magnitude.
+    forces, positions = (
+        _fit_coefficients(basis, part.reshape(len(lines_hz), -1)) for part in (exact[:, :m], exact[:, m:])
+    )
+    if forces is None or positions is None:
+        return None
+    coefficients = np.hstack([forces, positions])
+
+    def evaluate(frequency_hz: FloatArray) -> ComplexArray:
+        found: ComplexArray = (_basis_functions(frequency_hz, poles, unit) @ coefficients).reshape(-1, 2 * m, m)
+        slow = frequency_hz < lines_hz[0]
+        if slow.any():
+            found[slow] = inverse_response(model, frequency_hz[slow])
+        return found
+
+    return evaluate
+
+
+def _fit_coefficients(basis: ComplexArray, exact: ComplexArray) -> ComplexArray | None:
+    """(functions, entries): least-squares coefficients from every other line; None where the error at the others is too
+    large."""
+    size = np.abs(exact).max(axis=1)[:, None]
+    basis, exact = basis / size, exact / size
+    # Columns scaled to equal norm, so that units do not matter.
+    unit = np.linalg.norm(basis[::2], axis=0)
+    found = np.linalg.lstsq(basis[::2] / unit, exact[::2], rcond=1e-14)[0] / unit[:, None]
+    return found if np.all(np.abs(basis[1::2] @ found - exact[1::2]) <= FIT_TOLERANCE) else None
+
+
+def zeros_of(model: MechanicalModel, largest: float) -> ComplexArray:
+    """(k,), rad/s: transmission zeros with non-negative imaginary part."""
+    n, m = model.coordinates, model.inputs
+    left, right = np.zeros((2 * n + m, 2 * n + m)), np.zeros((2 * n + m, 2 * n + m))
+    left[:n, n : 2 * n] = np.eye(n)
+    left[n : 2 * n, :n], left[n : 2 * n, n : 2 * n] = -model.stiffness, -model.damping
+    left[n : 2 * n, 2 * n :], left[2 * n :, :n] = model.input, model.output[:m]
+    right[:n, :n], right[n : 2 * n, n : 2 * n] = np.eye(n), model.mass
+    above, below = scipy.linalg.eigvals(left, right, homogeneous_eigvals=True)
+    near = np.abs(above) < largest * np.abs(below)
+    found = above[near] / below[near]
+    return np.asarray(found[found.imag >= 0])
+
+
+def _lines_to_fit(poles: ComplexArray, highest_hz: float) -> FloatArray:
+    """(lines,), Hz, rising: over the whole range and about each resonance."""
+    width = np.maximum(np.abs(poles.real), 1e-6 * np.abs(poles))
+    about = (np.abs(poles.imag)[:, None] + width[:, None] * HALF_WIDTHS).ravel() / (2 * np.pi)
+    # Halved steps: fitted and test lines alternate.
+    whole = np.geomspace(1e-4 * highest_hz, highest_hz, LINES_OVER_RANGE)
+    even = np.linspace(0.0, highest_hz, LINES_OVER_RANGE)
+    return np.unique(np.clip(np.concatenate([about, 1.01 * about, whole, even]), 1e-6 * highest_hz, highest_hz))
+
+
+def _basis_functions(frequency_hz: FloatArray, poles: ComplexArray, unit: float) -> ComplexArray:
+    """(lines, functions): powers of s, and a resonance for each pole and its mirror image."""
+    s = 2j * np.pi * frequency_hz[:, None] / unit
+    powers = s ** np.arange(HIGHEST_POWER + 1)
+    both = [1 / (s - poles / unit), 1 / (s - np.conj(poles[poles.imag > 0]) / unit)]
+    return np.asarray(np.concatenate([powers, *both], axis=1))

@@ -1,0 +1,135 @@
+"""Pydantic's validation errors in the words of a protocol file's author: key, what is wrong, what is allowed."""
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import Any
+
+from protocols.definition.problem import InconsistentError, Problem
+from protocols.document.schema import UNITS, Node, Place, describe_allowed, keys_of, node_at, resolve_reference
+
+_LONGEST_WORD = 60
+"""Longest word (characters) that is compared with known keys: comparing longer ones would take minutes."""
+
+
+def problems_in(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:
+    """Every problem once. root: schema of the protocol's kind; errors: from pydantic's ValidationError."""
+    unknown = [error["loc"] for error in errors if error["type"] == "unexpected_keyword_argument"]
+    meant = {(*place[:-1], nearest_key(str(place[-1]), _keys_beside(root, place))) for place in unknown}
+    found: list[Problem] = []
+    for error in errors:
+        # A key under a wrong name is one problem, not two; and a list is not empty because its entries are wrong.
+        wrong_name = error["type"] == "missing" and error["loc"] in meant
+        wrong_entries = error["type"] == "too_short" and len(error["input"]) > 0
+        if not wrong_name and not wrong_entries:
+            found.extend(_translate_error(root, error))
+    return tuple(found)
+
+
+def key_path(root: Node, place: Place) -> str:
+    """`staircase.steps[2].step_db` from ("staircase", "steps", 1, "step_db"); list entries count from 1."""
+    path = ""
+    for depth, part in enumerate(place):
+        node = node_at(root, place[:depth])
+        if isinstance(part, int):
+            path += f"[{part + 1}]"
+        elif node is None or "oneOf" not in resolve_reference(root, node):
+            path += f".{part}" if path else part
+    return path
+
+
+def nearest_key(key: str, known: Sequence[str]) -> str | None:
+    """The known key that was probably meant: first the same quantity with another unit, then a similar spelling;
+    None if there is none."""
+    suffixes = tuple(f"_{unit}" for unit in UNITS)
+    for candidate in known:
+        if candidate.endswith(suffixes) and candidate.rsplit("_", 1)[0] in (key, key.rsplit("_", 1)[0]):
+            return candidate
+    close = get_close_matches(key[:_LONGEST_WORD].lower(), known, n=1)
+    return close[0] if close else None
+
+
+def shown(value: Any) -> str:
+    """A value as the file would write it, with its type where the type is the problem."""
+    match value:
+        case bool():
+            return f"{str(value).lower()}, a truth value"
+        case str():
+            return f'"{value}", a text'
+        case list():
+            return "a list"
+        case dict():
+            return "a table"
+        case _:
+            return str(value)
+
+
+def _translate_error(root: Node, error: Any) -> tuple[Problem, ...]:
+    place: Place = error["loc"]
+    if error["type"] == "json_invalid":  # nested too deeply
+        return (Problem("The text", f"cannot be read: {error['msg']}", "numbers and nesting of ordinary size"),)
+    key = key_path(root, place)
+    if error["type"] == "unexpected_keyword_argument":
+        return (_report_unknown_key(root, place),)
+    if error["type"] == "value_error" and isinstance(error["ctx"]["error"], InconsistentError):
+        return tuple(problem.below(key) for problem in error["ctx"]["error"].problems)
+    if error["type"] in ("union_tag_not_found", "union_tag_invalid"):
+        return (_wrong_kind_of_entry(root, place, error),)
+    node = node_at(root, place)
+    name = str(place[-1]) if isinstance(place[-1], str) else str(place[-2])
+    return (Problem(key, _problem_text(error), describe_allowed(root, node, name) if node else "something else"),)
+
+
+def _problem_text(error: Any) -> str:
+    value = error["input"]
+    match error["type"]:
+        case "missing":
+            return "is missing"
+        case "less_than_equal" | "less_than":
+            return f"is {value}, which is too large"
+        case "greater_than_equal" | "greater_than":
+            return f"is {value}, which is too small"
+        case "finite_number":
+            return f"is {value}, not a finite number"
+        case "literal_error" | "enum" | "string_pattern_mismatch" if isinstance(value, str):
+            return f'is "{value}"'
+        case "string_too_short" | "string_too_long":
+            return f"has {len(value)} characters"
+        case "too_short" | "too_long":
+            return f"has {len(value)} entries"
+        case _:
+            return f"is {shown(value)}"
+
+
+def _report_unknown_key(root: Node, place: Place) -> Problem:
+    key, known = str(place[-1]), _keys_beside(root, place)
+    table = key_path(root, place[:-1])
+    problem = f"is no key of {f'[{table}]' if table else 'a protocol'}"
+    homes = _homes_of(root, key)
+    if table and key in root["properties"]:
+        problem += "; it belongs at the top of the file, before the first [table]"
+    elif homes:
+        problem += f"; it belongs in [{homes[0]}]"
+    elif meant := nearest_key(key, known):
+        problem += f"; did you mean {meant}"
+    return Problem(key_path(root, place), problem, ", ".join(known))
+
+
+def _wrong_kind_of_entry(root: Node, place: Place, error: Any) -> Problem:
+    node = resolve_reference(root, node_at(root, place) or {})
+    tag, choices = node["discriminator"]["propertyName"], node["discriminator"]["mapping"]
+    given = error["input"].get(tag)
+    problem = "is missing" if given is None else f'is "{given}"'
+    if isinstance(given, str) and (close := get_close_matches(given[:_LONGEST_WORD], choices, n=1)):
+        problem += f'; did you mean "{close[0]}"'
+    return Problem(f"{key_path(root, place)}.{tag}", problem, " or ".join(f'"{choice}"' for choice in choices))
+
+
+def _keys_beside(root: Node, place: Place) -> tuple[str, ...]:
+    table = node_at(root, place[:-1])
+    return keys_of(root, table) if table else ()
+
+
+def _homes_of(root: Node, key: str) -> list[str]:
+    """Top-level tables that have this key."""
+    sections = {name: resolve_reference(root, node) for name, node in root["properties"].items()}
+    return [name for name, section in sections.items() if key in section.get("properties", {})]

@@ -1,0 +1,239 @@
+"""Input and output of a tick, compiled: the reading of the sensors, and the writing of the force.
+
+The only implementation for every caller: the loop calls it without the interpreter, the rig's own methods call it from
+Python. A return value of 0 is success; any other is one of the codes below, `FAILED` keeps the first, and no force
+follows it.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from equalizer.signals.signal import FloatArray
+from study.devices.accelerometer.newest_sample import CLIPPED, COUNT, FRESH_S, REST, ROWS, SENSED, TAKEN_S
+from study.devices.drive.compiled_drive import SENSE_SIGNATURE, WRITE_SIGNATURE
+from study.devices.force_dimension.handle import SCALED, STALE
+from study.devices.force_dimension.loop_cells import (
+    BRAKES,
+    CAP_N,
+    CLOSED,
+    DROPS_AFTER_S,
+    ENABLE,
+    FAILED,
+    FAILED_BEFORE,
+    FORCE,
+    IS_CLOSED,
+    LET_GO,
+    LOCKED,
+    NUMBER,
+    POSITION,
+    READS,
+    REFUSED,
+    REFUSED_N,
+    RELEASED,
+    REPEATED,
+    REPEATS,
+    SENT_S,
+    SENT_ZERO,
+    TOO_STRONG,
+    WEAK,
+    WITHHELD_UNTIL_S,
+    check_on,
+    count_beyond_share,
+    look,
+    note_sent,
+    record_failure,
+    record_library_failure,
+)
+from study.devices.governor.compiling import fingerprint, part
+from study.devices.native import Addresses, acquire, call_int, now_s, release
+from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
+
+LOOK_EVERY = 10
+"""Ticks between two readings of status and buttons (100 Hz at 1 kHz: a person cannot press faster)."""
+
+STALE_FOR, STALE_SHARE = 50, 0.5
+"""Readings that only repeat an earlier one: so many in a row, or as many beyond this share of all readings, end the
+force. At 1 kHz half of what counts as a lost loop."""
+
+SCALED_FOR, SCALED_SHARE = 5, 0.02
+"""The same of forces that the device cannot give in full: what a participant feels is then not what is written down.
+A force whose peaks alone are scaled is so only for some milliseconds in a row, again and again."""
+
+ROUNDING = 1 + 1e-9
+"""Factor on the cap that rounding may need."""
+LOCK_S = 0.002
+"""Longest wait for the lock (s). A write lasts a tenth of it: a longer wait is for a call that hangs."""
+
+
+@part
+def _sense_acceleration(samples: FloatArray, now: float, reading: FloatArray) -> None:
+    """Read the accelerometer in compiled code, as `study.devices.accelerometer.newest_sample.NewestSample.fresh` does
+    in Python."""
+    count = samples[0, COUNT]
+    while count > 0.0:
+        row = 1 + int(count - 1.0) % ROWS
+        fresh = not now - samples[row, TAKEN_S] > FRESH_S
+        for i in range(3):
+            value = samples[row, SENSED + i] - samples[0, REST + i]
+            reading[ACCELERATION.start + i] = value if fresh else math.nan
+        reading[SENSOR_CLIPPED] = 1.0 if fresh and samples[row, CLIPPED] != 0.0 else 0.0
+        newer = samples[0, COUNT]
+        if newer - count < ROWS - 1:
+            break
+        count = newer
+
+
+@part
+def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
+    if cells[FAILED] != 0.0:
+        return FAILED_BEFORE
+    for i in range(READING_SIZE):
+        reading[i] = math.nan
+    place = reading.ctypes.data
+    asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
+    answer = call_int(calls[POSITION], asked)
+    if answer < 0:
+        return record_library_failure(cells, POSITION)
+    if cells[READS] % LOOK_EVERY == 0.0:
+        code = look(calls, cells)
+        if code != 0:
+            return code
+    cells[READS] += 1.0
+    cells[REPEATED] = count_beyond_share(cells[REPEATED], answer == STALE, STALE_SHARE)
+    if cells[REPEATED] >= STALE_FOR * (1.0 - STALE_SHARE):
+        return record_failure(cells, REPEATS)
+    reading[SENSOR_CLIPPED] = 0.0
+    if samples.shape[0] > 1:
+        _sense_acceleration(samples, now_s(calls), reading)
+    return 0
+
+
+@part
+def _is_silent(calls: Addresses, cells: FloatArray) -> bool:
+    """Whether no force was sent for longer than the device holds a force by itself."""
+    return bool(now_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
+
+
+@part
+def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float) -> int:
+    return int(call_int(calls[FORCE], (x, y, z, np.int32(cells[NUMBER]))))
+
+
+@part
+def _wake_device(calls: Addresses, cells: FloatArray) -> int:
+    """After a silence that was longer than the watchdog. In the middle of a force that is an end; with none it is
+    not: the computer was asleep, or nothing was played."""
+    code = check_on(calls, cells)
+    if code >= 0:
+        return code
+    number = np.int32(cells[NUMBER])
+    if call_int(calls[BRAKES], (np.int32(0), number)) < 0:
+        return record_library_failure(cells, BRAKES)
+    if call_int(calls[ENABLE], (np.int32(1), number)) < 0:
+        return record_library_failure(cells, ENABLE)
+    return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else record_library_failure(cells, FORCE)
+
+
+@part
+def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+    """Send a force. The caller must hold the lock."""
+    if _is_silent(calls, cells):
+        code = _wake_device(calls, cells)
+        if code != 0:
+            return code
+    x, y, z = force[0], force[1], force[2]
+    answer = _set_force(calls, cells, x, y, z)
+    if answer < 0:
+        return record_library_failure(cells, FORCE)
+    cells[SENT_S] = now_s(calls)
+    note_sent(cells, x, y)
+    cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
+    cells[TOO_STRONG] = count_beyond_share(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
+    if cells[TOO_STRONG] >= SCALED_FOR * (1.0 - SCALED_SHARE):
+        return record_failure(cells, WEAK)
+    return 0
+
+
+@part
+def _send_zero(calls: Addresses, cells: FloatArray) -> int:
+    if _set_force(calls, cells, 0.0, 0.0, 0.0) < 0:
+        return record_library_failure(cells, FORCE)
+    if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
+        # A force was cut off: its call may hang still, and must find a device that takes none.
+        code = check_on(calls, cells)
+        if code != 0 and code != RELEASED:
+            return code
+    note_sent(cells, 0.0, 0.0)
+    cells[SENT_ZERO], cells[TOO_STRONG] = 1.0, 0.0
+    if not _is_silent(calls, cells):
+        cells[SENT_S] = now_s(calls)
+    return 0
+
+
+@part
+def _write_zero(calls: Addresses, cells: FloatArray) -> int:
+    """Past everything: neither a lock nor an earlier failure may hold up a zero. It wakes no sleeping device."""
+    if cells[LET_GO] != 0.0:
+        return 0
+    got = acquire(calls, LOCK_S)
+    code = _send_zero(calls, cells)
+    if got:
+        release(calls)
+    return code
+
+
+@part
+def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+    if now_s(calls) < cells[WITHHELD_UNTIL_S]:
+        return 0
+    norm = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+    if norm == 0.0:
+        return _write_zero(calls, cells)
+    if not norm <= cells[CAP_N] * ROUNDING:
+        code = _write_zero(calls, cells)
+        if cells[FAILED] == 0.0:
+            cells[REFUSED_N] = norm
+        return code if code != 0 else record_failure(cells, REFUSED)
+    if cells[FAILED] != 0.0:
+        return FAILED_BEFORE
+    if not acquire(calls, LOCK_S):
+        return record_failure(cells, LOCKED)
+    code = _send_force(calls, cells, force) if cells[CLOSED] == 0.0 else record_failure(cells, IS_CLOSED)
+    release(calls)
+    return code
+
+
+def _entry_points(sources: int) -> tuple[Any, Any, Any]:
+    @njit(SENSE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def sense_once(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
+        _ = sources
+        return _sense(calls, cells, samples, reading)
+
+    @njit(WRITE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def write_once(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+        _ = sources
+        return _write(calls, cells, force)
+
+    @njit(WRITE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def send_once(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+        _ = sources
+        return _send_force(calls, cells, force)
+
+    return sense_once, write_once, send_once
+
+
+_DEVICES = Path(__file__).parents[1]
+sense_once, write_once, send_once = _entry_points(
+    fingerprint(
+        Path(__file__).parent,
+        *(
+            _DEVICES / name
+            for name in ("rig.py", "native.py", "accelerometer/newest_sample.py", "governor/compiling.py")
+        ),
+    )
+)
+"""The first two as `study.devices.rig.CompiledIo` wants them; `send_once`: what `write_once` does with the lock."""

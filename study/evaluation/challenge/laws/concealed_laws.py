@@ -1,0 +1,150 @@
+"""The concealed laws: formulas outside the catalogue, with parameters drawn anew for each device.
+
+They share no code with the grammar of the diagnosis, and some have shapes that the grammar cannot express. The label
+describes a law as a reader would: on what it acts, which variables it needs, whether it has a memory.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from equalizer.signals.signal import FloatArray
+from study.evaluation.challenge import law_kernel as kernel
+
+Random = np.random.Generator
+ActsOn = Literal["force", "command", "response"]
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Largest travel, speed, reading and force of an axis without the law."""
+
+    travel_m: float
+    speed_mps: float
+    reading_mps2: float
+    force_n: float = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class LawKind:
+    """One family of laws, and how its numbers are drawn."""
+
+    name: str
+    formula: str
+    """For a reader; k is the size, a and b parameters, s a sign, x along its axis, y along another."""
+    draw: Callable[[Random, Sizes], tuple[float, float]]
+    """Draws a and b."""
+    variables: tuple[str, ...]
+    """Equivalent sets of variables, each separated by spaces."""
+    code: int = -1
+    """Code in `law_kernel`, for forces."""
+    acts_on: tuple[ActsOn, ...] = ("force",)
+    """Equivalent places of action."""
+    memory: bool = False
+    axes: int = 1
+    both: bool = False
+    """Whether the law acts on the other axis as well."""
+    change: Callable[[FloatArray, FloatArray, float, float], FloatArray] | None = None
+    """For commands or readings: change for k = 1, from own axis, other axis, a and b."""
+
+
+def _draw_simple_or_any(random: Random, simple: tuple[float, ...], low: float, high: float) -> float:
+    """Draw, with equal probability, one of the simple numbers or any number in the range."""
+    return float(random.choice(simple)) if random.random() < 0.5 else float(random.uniform(low, high))
+
+
+def _no_parameters(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return 0.0, 0.0
+
+
+def _speed_power(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return _draw_simple_or_any(random, (1.5, 3.0), 1.3, 3.2), 0.0
+
+
+def _place_power(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return _draw_simple_or_any(random, (1.5, 2.0, 5.0), 1.4, 4.0), 0.0
+
+
+def _low_power(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return float(random.choice((1.0, 2.0))), 0.0
+
+
+def _pitch(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return sizes.travel_m * random.uniform(0.3, 0.9), random.uniform(-np.pi, np.pi)
+
+
+def _pump(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return random.uniform(0.5, 6.0), random.uniform(-np.pi, np.pi)
+
+
+def _magnet(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return sizes.travel_m * random.uniform(1.4, 2.2), float(random.choice((1.0, 2.0, 3.0)))
+
+
+def _quick(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return float(np.exp(random.uniform(np.log(0.008), np.log(0.4)))), 0.0
+
+
+def _draw_slow(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return random.uniform(0.4, 4.0), 0.0
+
+
+def _part_of_speed(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return sizes.speed_mps * random.uniform(0.1, 0.5), 0.0
+
+
+def _part_of_travel(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return sizes.travel_m * random.uniform(0.1, 0.5), 1.5
+
+
+def _part_of_force(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return sizes.force_n * random.uniform(0.3, 0.8), 0.0
+
+
+def _part_of_reading(random: Random, sizes: Sizes) -> tuple[float, float]:
+    return sizes.reading_mps2 * random.uniform(0.3, 0.8), 0.0
+
+
+def _force(  # noqa: PLR0913 - the columns of the table below
+    name: str, formula: str, code: int, draw: Callable[[Random, Sizes], tuple[float, float]],
+    *variables: str, axes: int = 1, memory: bool = False, both: bool = False,
+) -> LawKind:  # fmt: skip
+    return LawKind(name, formula, draw, variables, code, memory=memory, axes=axes, both=both)
+
+
+LAW_KINDS: tuple[LawKind, ...] = (
+    _force("drag of a power", "-k |v|^a sgn v", kernel.SPEED_POWER, _speed_power, "vx"),
+    _force("spring of a power", "-k |x|^a sgn x", kernel.PLACE_POWER, _place_power, "x"),
+    _force("drag that grows with the place", "-k |x|^a v", kernel.PLACE_DRAG, _low_power, "x vx"),
+    _force("spring that grows with the speed", "-s k x |v|^a", kernel.SPEED_SPRING, _low_power, "x vx"),
+    _force("gain that ripples", "k u sin(2 pi x / a + b)", kernel.GAIN_RIPPLE, _pitch, "fx x"),
+    _force("pumped stiffness", "-k x sin(2 pi a t + b)", kernel.PUMPED, _pump, "t x"),
+    _force("attraction", "s k (1 / (a - s x)^b - 1 / a^b)", kernel.ATTRACTION, _magnet, "x"),
+    _force("relaxation", "-k (x - lag(x, a))", kernel.RELAXATION, _quick, "x", "vx", memory=True),
+    _force("heating gain", "-k u lag(u^2, a)", kernel.HEATING, _draw_slow, "fx", memory=True),
+    _force("soft drag", "-k tanh(v / a)", kernel.SOFT_DRAG, _part_of_speed, "vx"),
+    _force("soft spring", "-k atan(x / a)", kernel.SOFT_SPRING, _part_of_travel, "x"),
+    _force("fading drag", "-k v / (1 + (v / a)^2)", kernel.FADING_DRAG, _part_of_speed, "vx"),
+    _force("contact on one side", "-s k max(s x - a, 0)^b", kernel.CONTACT, _part_of_travel, "x"),
+    _force("drag beyond a place", "-k v where s x > a", kernel.EDGE_DRAG, _part_of_travel, "x vx"),
+    _force("square of another axis", "-s k y^2", kernel.CROSS_SQUARE, _no_parameters, "y", axes=2),
+    _force("spring that another axis stiffens", "-k x y^2", kernel.CROSS_SPRING, _no_parameters, "x y", axes=2),
+    _force("drag that another axis makes", "-k vx |vy|", kernel.CROSS_DRAG, _no_parameters, "vx vy", axes=2),
+    _force("gyroscopic", "s k vy, on the other -s k vx", kernel.WHIRL, _no_parameters, "vy", axes=2, both=True),
+    _force("drag along the path", "-k |v| v of both axes", kernel.ALL_DRAG, _no_parameters, "vx vy", axes=2, both=True),
+    LawKind("soft amplifier", "a tanh(u / a)", _part_of_force, ("fx",), acts_on=("command", "force"),
+            change=lambda u, other, a, b: a * np.tanh(u / a) - u),
+    LawKind("amplifier of two gains", "u + s k |u|", _no_parameters, ("fx",), acts_on=("command", "force"),
+            change=lambda u, other, a, b: np.abs(u)),
+    LawKind("bent amplifier", "u + s k u |u|", _no_parameters, ("fx",), acts_on=("command", "force"),
+            change=lambda u, other, a, b: u * np.abs(u)),
+    LawKind("crooked sensor", "r + s k r^2", _no_parameters, ("ax",), acts_on=("response",),
+            change=lambda r, other, a, b: r * r),
+    LawKind("soft sensor", "a atan(r / a)", _part_of_reading, ("ax",), acts_on=("response",),
+            change=lambda r, other, a, b: a * np.arctan(r / a) - r),
+    LawKind("sensor of two axes", "rx + s k rx ry", _no_parameters, ("ax ay",), acts_on=("response",), axes=2,
+            change=lambda r, other, a, b: r * other),
+)  # fmt: skip
+LAW_OF_NAME = {kind.name: kind for kind in LAW_KINDS}

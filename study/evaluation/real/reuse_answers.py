@@ -1,0 +1,104 @@
+"""Reuse of answers of an earlier run of `hapteq real`.
+
+An answer is reused if the hashes of its input files and its settings are unchanged; otherwise the whole run is refused
+before any work, with the changes.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from analysis.diagnosis.real_answer.real_answer import RealAnswer
+from study.errors import StudyError
+from study.evaluation.real.real_folder import RealRecording
+from study.store.disk.provenance import Provenance, gather_provenance
+from study.store.formats.real_answer_file import read_answer_and_origin
+
+ANSWER_NAME, INJECTED_NAME = "answer.json", "injected"
+"""File with the answer to a recording, and folder with the answers to injected faults."""
+
+
+@dataclass(frozen=True, slots=True)
+class _EarlierAnswer:
+    place: Path
+    answer: RealAnswer
+    changes: tuple[str, ...]
+    """Changes of its inputs and settings since then, as sentences."""
+
+
+def answer_place(out: Path, real_recording: RealRecording) -> Path:
+    """Folder with the results of one recording."""
+    return out / real_recording.folder.name / real_recording.name
+
+
+def origin_of_answer(real_recording: RealRecording, seconds: float | None) -> Provenance:
+    """Provenance: all inputs on which an answer depends. Raises CannotReadError."""
+    files = tuple(dict.fromkeys((*real_recording.parents, *real_recording.tested_on)))
+    return gather_provenance(parents=files, settings={"seconds": seconds})
+
+
+def reusable_answers(out: Path, wanted: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
+    """Earlier answers by folder; nothing is written. Raises StudyError where one is damaged or was made from other
+    inputs."""
+    answered = [recording for recording in wanted if (answer_place(out, recording) / ANSWER_NAME).is_file()]
+    earlier = [_read_earlier_answer(answer_place(out, recording), recording, seconds) for recording in answered]
+    if outdated := [answer for answer in earlier if answer.changes]:
+        raise _inputs_changed_error(out, outdated)
+    return {answer.place: answer.answer for answer in earlier}
+
+
+def _read_earlier_answer(place: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
+    try:
+        answer, origin = read_answer_and_origin(place / ANSWER_NAME)
+    except StudyError as error:
+        raise StudyError(
+            f"{real_recording.folder.name}/{real_recording.name}/{error.title}",
+            error.happened,
+            f"Move {place} away to diagnose it again, or choose another --out.",
+            saved="Nothing was written.",
+        ) from error
+    now = origin_of_answer(real_recording, seconds)
+    files = {(parent.file, parent.sha256) for parent in now.parents}
+    return _EarlierAnswer(place, answer, (*_file_changes(_files_in(origin), files), *_setting_changes(origin, seconds)))
+
+
+def _files_in(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
+    stored = origin.get("parents")
+    parents = stored if isinstance(stored, list) else []
+    return {(str(parent.get("file")), str(parent.get("sha256"))) for parent in parents if isinstance(parent, dict)}
+
+
+def _file_changes(then: set[tuple[str, str]], now: set[tuple[str, str]]) -> Iterator[str]:
+    names_then, names_now = ({name for name, _ in files} for files in (then, now))
+    for name in sorted({name for name, _ in then ^ now}):
+        if name not in names_then:
+            yield f"{name} is not among its recorded inputs"
+        else:
+            yield f"{name} has changed" if name in names_now else f"{name} is gone"
+
+
+def _setting_changes(origin: Mapping[str, Any], seconds: float | None) -> Iterator[str]:
+    settings = origin.get("settings")
+    then = settings.get("seconds", "") if isinstance(settings, dict) else ""
+    if not isinstance(then, int | float | None):
+        yield "its --seconds is not recorded"
+    elif then != seconds:
+        yield f"--seconds was {_seconds(then)}, and is {_seconds(seconds)}"
+
+
+def _seconds(limit_s: float | None) -> str:
+    return "left out" if limit_s is None else f"{limit_s:g}"
+
+
+def _inputs_changed_error(out: Path, outdated: Sequence[_EarlierAnswer]) -> StudyError:
+    texts = (f"{answer.place.relative_to(out) / ANSWER_NAME}: {', '.join(answer.changes)}." for answer in outdated)
+    places = [str(answer.place) for answer in outdated]
+    if (injected := out / INJECTED_NAME).exists():
+        places.append(f"{injected}, which was computed from them")
+    return StudyError(
+        "Inputs of existing answers have changed",
+        " ".join(texts),
+        f"Choose another --out; or, to diagnose them again, move away {'; '.join(places)}.",
+        saved="The existing answers are unchanged, and nothing was written.",
+    )

@@ -1,0 +1,239 @@
+"""Combine model files for playback: one model, several places of one device, or two bands at one place."""
+
+import hashlib
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from analysis.wording import typeset
+from equalizer.plant.identified_model import IdentifiedModel
+from equalizer.plant.model_quality import ModelQuality, worst_quality
+from equalizer.plant.model_response import model_response
+from equalizer.tracking.bands.narrow_and_wide_models import TwoModels
+from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY
+from equalizer.tracking.workspace.feedforward_at_place import used_models
+from equalizer.tracking.workspace.interpolation_choice import InterpolationChoice, PlaceCheck, choose_interpolation
+from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
+from equalizer.tracking.workspace.place_weights import place_weights
+from equalizer.tracking.workspace.workspace_models import WorkspaceError, WorkspaceModels
+from study.errors import StudyError, WrongUseError
+from study.store.disk.provenance import sha256_of
+from study.store.formats.identified_model_file import read_identified_model
+
+SAME_PLACE_M = 0.001
+GAIN_LINES = 100
+HIGHEST_GAIN = 1e6
+"""Largest plausible gain (m/s^2 per N): no handle weighs a milligram."""
+FAR_M = 0.005
+"""Distance from the place of a single model beyond which the user is warned."""
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaybackModels:
+    """Identified models read from files and combined for a place in the workspace."""
+
+    given: tuple[IdentifiedModel, ...]
+    at: ModelsAtPlace
+    """For two bands: the narrow model only."""
+    two: TwoModels | None
+    choice: InterpolationChoice | None
+    """None for models of one place."""
+    remarks: tuple[str, ...]
+    """Sentences."""
+    held_out: tuple[str, ...]
+    """Sentences: the error at places that were left out and interpolated from the others."""
+    sha256: str
+    """Hash of all files, and of the place where it affects the forces."""
+
+    @property
+    def quality(self) -> ModelQuality | None:
+        """Expected error of the worst model; None if any has none."""
+        return worst_quality(tuple(model.quality for model in self.given))
+
+    @property
+    def nearest(self) -> IdentifiedModel:
+        """The given model nearest to the place; for two bands the narrow one."""
+        if self.two is not None:
+            return self.two.narrow
+        place_m = self.at.place_m
+        return min(self.given, key=lambda model: math.dist(model.place_m or place_m, place_m))
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """Band for which an error is predicted: common to all models used."""
+        return used_models(self.at)[0][1].band_hz
+
+    @property
+    def largest(self) -> IdentifiedModel:
+        """The model with the largest weight at the place."""
+        return self.at.models[int(np.argmax(self.at.weights))]
+
+
+def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: float) -> PlaybackModels:
+    """Read and combine the models. Raises StudyError for files that are not models, cannot play a table, or do not
+    go together."""
+    if at_m is not None and not all(map(math.isfinite, at_m)):
+        raise WrongUseError(
+            "There is no such place",
+            f"--at is {', '.join(f'{part:g}' for part in at_m)}; a place is three numbers, in metres.",
+            "Such as --at 0.02 0 0.",
+            saved="Nothing was written.",
+        )
+    models = tuple(_readable(path) for path in paths)
+    if len(models) == 1:
+        return _single_model(paths, models[0], at_m)
+    if _of_one_place(models):
+        return _two_bands(paths, models, at_m)
+    try:
+        return _several_places(paths, WorkspaceModels(models), at_m, weight)
+    except WorkspaceError as problem:
+        numbered = ", ".join(f"{number}: {path.name}" for number, path in enumerate(paths, start=1))
+        raise _unfit_error(
+            f"{_sentence(str(problem))} Models are {numbered}.", "Give models that go together."
+        ) from problem
+
+
+def _single_model(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> PlaybackModels:
+    at = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
+    return PlaybackModels((model,), at, None, None, _far(paths[0], model, at_m), (), _sha256(paths))
+
+
+def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None) -> PlaybackModels:
+    if len(models) > 2:
+        raise _unfit_error(
+            f"{len(models)} models are of one place.", "Give one of them, or a narrow and a wide one for bands."
+        )
+    narrow, wide = sorted(models, key=lambda model: model.band_hz[1])
+    if narrow.sample_rate_hz != wide.sample_rate_hz:
+        raise _unfit_error(
+            f"They run at {narrow.sample_rate_hz:g} and {wide.sample_rate_hz:g} Hz.", "Identify both at one rate."
+        )
+    try:
+        two = TwoModels(narrow, wide)
+    except ValueError as problem:
+        raise _unfit_error(
+            f"Both models are of one place, but {problem}.",
+            "Give one of them, or identify both alike (with or without --with-spring), such as --band 5 35 and "
+            "--band 5 400 --order 40.",
+        ) from problem
+    at = ModelsAtPlace(at_m or narrow.place_m or (0.0, 0.0, 0.0), (narrow,), (1.0,))
+    return PlaybackModels(models, at, two, None, _far(paths[0], narrow, at_m), (), _sha256(paths))
+
+
+def _several_places(
+    paths: tuple[Path, ...], workspace: WorkspaceModels, at_m: Vector | None, weight: float
+) -> PlaybackModels:
+    if at_m is None:
+        places = "; ".join(
+            f"{path.name} {_mm(model.place_m)}" for path, model in zip(paths, workspace.models, strict=True)
+        )
+        raise WrongUseError(
+            "At which place shall it be played?",
+            f"The models are of several places: {places}.",
+            "Say where with --at X Y Z, in metres.",
+            saved="Nothing was written.",
+        )
+    if len({model.provenance.get("input", "command") for model in workspace.models}) > 1:
+        raise WorkspaceError("some models hold the spring they were recorded under and some do not")
+    choice = choose_interpolation(workspace, weight=weight)
+    at = choice.at(at_m)
+    remarks = [_sentence(choice.reason)]
+    outside = place_weights(workspace.places_m, at_m).remark
+    remarks += [_sentence(remark) for remark in dict.fromkeys((*at.remarks, *([outside] if outside else [])))]
+    if not choice.checks:
+        remarks.append("No place could be held out: what the error is between the models' places is not known.")
+    held_out = tuple(_held_out(check) for check in choice.checks)
+    return PlaybackModels(workspace.models, at, None, choice, tuple(remarks), held_out, _sha256(paths, at_m))
+
+
+def _held_out(check: PlaceCheck) -> str:
+    modal = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
+    return (
+        f"Held out {_mm(check.place_m)}: error {100 * check.blended_error:.1f} % (rms over lines) with blended forces, "
+        f"{modal} with resonances interpolated."
+    )
+
+
+def _readable(path: Path) -> IdentifiedModel:
+    """Read a model and give its channels a table's names; files may use others, such as x, y, z, or numbers."""
+    model = read_identified_model(path)
+    in_order = all(_in_order(names) for names in (model.input_channels, model.output_channels))
+    if not in_order or (model.input_unit, model.output_unit) != (FORCES.unit, TRAJECTORY.unit):
+        raise _unfit_error(
+            f"{path.name} goes from {', '.join(model.input_channels)} in {model.input_unit} to "
+            f"{', '.join(model.output_channels)} in {model.output_unit}; a table needs a model from fx, fy, fz in N to "
+            "ax, ay, az in m/s^2, in this order.",
+            "Identify one from recordings of all three axes, with channel names that end in x, y and z.",
+        )
+    if model.spectral_radius >= 1:
+        raise _unfit_error(
+            f"The model in {path.name} is not stable (slowest pole {model.spectral_radius:.5f}).",
+            "Identify it again with hapteq identify, which makes stable ones only.",
+        )
+    if not (gain := peak_gain(model)) <= HIGHEST_GAIN:
+        raise _unfit_error(
+            f"By {path.name} 1 N accelerates the handle with up to {gain:.2g} m/s^2; a model is taken up to "
+            f"{HIGHEST_GAIN:g} m/s^2.",
+            "Check the units of the recording that it was made from, and identify it again.",
+        )
+    return replace(model, input_channels=FORCES.header[1:], output_channels=TRAJECTORY.header[1:])
+
+
+def _in_order(names: tuple[str, ...]) -> bool:
+    """Whether there are three names, none of which contradicts its position."""
+    letters = [name[-1:].lower() for name in names]
+    return len(names) == 3 and (letters == ["x", "y", "z"] or not set(letters) & set("xyz"))
+
+
+def peak_gain(model: IdentifiedModel) -> float:
+    """Largest gain of one output to one input in the band."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.abs(model_response(model, np.geomspace(*model.band_hz, GAIN_LINES))).max())
+
+
+def _of_one_place(models: tuple[IdentifiedModel, ...]) -> bool:
+    places = [model.place_m for model in models]
+    if all(place is None for place in places):
+        return True
+    known = [place for place in places if place is not None]
+    return len(known) == len(places) and all(math.dist(known[0], place) <= SAME_PLACE_M for place in known)
+
+
+def _far(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, ...]:
+    if at_m is None:
+        return ()
+    if model.place_m is None:
+        return (f"{path.name} does not say where it was identified; it is used as if it were at the place.",)
+    away_m = math.dist(model.place_m, at_m)
+    if away_m <= FAR_M:
+        return ()
+    return (
+        f"{path.name} was identified {1e3 * away_m:.0f} mm from the place: coupling comes back with the distance. "
+        "Models of several places on both sides of it can be interpolated.",
+    )
+
+
+def _sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
+    """Hash of the files; a single file keeps its own, so that it can be compared by hand."""
+    each = [sha256_of(path) for path in paths]
+    if len(each) == 1:
+        return each[0]
+    return hashlib.sha256(" ".join([*sorted(each), repr(at_m)]).encode()).hexdigest()
+
+
+def _mm(place_m: Vector | None) -> str:
+    return (
+        "(place not known)" if place_m is None else f"({', '.join(typeset(f'{1e3 * part:g}') for part in place_m)}) mm"
+    )
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
+def _unfit_error(happened: str, do_now: str) -> StudyError:
+    return StudyError("These models cannot equalize the table", happened, do_now, saved="Nothing was written.")

@@ -1,0 +1,46 @@
+"""Pieces of work on an executor, on this computer or a cluster: each result is returned as soon as it is available."""
+
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from itertools import islice
+from typing import Any, TypeVar
+
+Key = TypeVar("Key")
+Result = TypeVar("Result")
+AHEAD = 100
+"""Largest number of pieces in flight, chosen by hand: it bounds the inputs and results in memory."""
+
+
+def finished_pieces(
+    executor: Executor,
+    function: Callable[..., Result],
+    pieces: Iterable[tuple[Key, tuple[Any, ...]]],
+    ahead: int = AHEAD,
+) -> Iterator[tuple[Key, Result]]:
+    """Call `function(*arguments)` for each (key, arguments), and yield (key, result) in the order of finishing.
+
+    function, arguments and results are sent between processes. Exceptions of the function are raised here, after the
+    results that are there by then. An early end cancels what was not begun. pieces: taken as they are needed.
+    """
+    waiting, running = iter(pieces), dict[Future[Result], Key]()
+    try:
+        while True:
+            for key, arguments in islice(waiting, ahead - len(running)):
+                running[executor.submit(_run_in_worker, tuple(sys.argv), function, arguments)] = key
+            if not running:
+                return
+            done = wait(running, return_when=FIRST_COMPLETED).done
+            # Results first: an error ends this, and must not lose what finished beside it.
+            for future in sorted(done, key=lambda each: each.cancelled() or each.exception() is not None):
+                key = running.pop(future)
+                yield key, future.result()
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _run_in_worker(command: tuple[str, ...], function: Callable[..., Result], arguments: tuple[Any, ...]) -> Result:
+    """Runs in a worker. command: what was typed, which the provenance of results says, and not how a worker began."""
+    sys.argv = list(command)
+    return function(*arguments)

@@ -1,0 +1,147 @@
+"""The force balance beside a given model, and what a gain on held-out data is worth."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.confirm import decide_with_model as beside_given
+from analysis.diagnosis.confirm.balance_with_model import find_balances_beside_model
+from analysis.diagnosis.confirm.decide_with_model import objection
+from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_something
+from analysis.diagnosis.search.time_budget import always
+from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ, MASS, DAMPING, LEVEL = 200.0, 2.0, 5.0, 3.0
+GIVEN = MechanicalModel(
+    "slide", "position", np.eye(1) * MASS, np.eye(1) * DAMPING, np.zeros((1, 1)), np.eye(1), np.eye(1),
+    tolerance=Tolerance(0.05, 0.5, 1.0),
+)  # fmt: skip
+
+
+def rubbing(level, mass=MASS):
+    seconds = np.arange(6000) / RATE_HZ
+    lines = [(0.05, 2 * np.pi * 0.31), (0.02, 2 * np.pi * 0.83), (0.008, 2 * np.pi * 1.7)]
+    x = sum(size * np.sin(w * seconds) for size, w in lines)
+    v = sum(size * w * np.cos(w * seconds) for size, w in lines)
+    a = sum(-size * w**2 * np.sin(w * seconds) for size, w in lines)
+    noise = np.random.default_rng(3).normal(0, [1e-6, 0.01], (len(x), 2))
+    force = mass * a + DAMPING * v + level * np.tanh(v / 1e-3)
+    return Recording(
+        "slide",
+        Signal((force + noise[:, 1])[:, None], RATE_HZ, "force", "N", ("force",)),
+        Signal((x + noise[:, 0])[:, None], RATE_HZ, "position", "m", ("x",)),
+        meta={"imposed": True},
+    )
+
+
+@pytest.fixture(scope="module")
+def with_friction():
+    return find_balances_beside_model((rubbing(LEVEL),), GIVEN, frozenset(), always)[0]
+
+
+def test_what_a_given_model_lacks_is_named_by_the_balance(with_friction):
+    law = with_friction.named[0]
+    assert law.law.effect == "coulomb_friction"
+    assert law.values["level"] == pytest.approx(LEVEL, rel=0.1)
+    assert law.gain_low > 0.5
+
+
+@pytest.mark.parametrize("mass", [MASS, MASS + 0.05], ids=["as calibrated", "a standard deviation off"])
+def test_a_device_within_its_calibration_lacks_nothing(mass):
+    (balance,) = find_balances_beside_model((rubbing(0.0, mass),), GIVEN, frozenset(), always)
+    assert balance.named == ()
+    assert balance.linear < 0.05
+
+
+def test_a_calibrated_number_does_not_take_friction_on_itself(with_friction):
+    """Fitted freely, damping would hold part of it; its prior keeps it within a few standard deviations."""
+    regression = with_friction.search.regression
+    deviations = regression.weights(regression.columns_of(()))[1 : regression.base - 1]
+    assert np.abs(deviations).max() < 10
+    loose = replace(regression, prior=None)
+    assert (
+        loose.cross_validated_errors(loose.columns_of(())).sum()
+        <= regression.cross_validated_errors(regression.columns_of(())).sum()
+    )
+
+
+def candidate(residuals, name="coulomb_friction", deviations=(0.0,)):
+    claim = SimpleNamespace(effect=SimpleNamespace(name=name, simpler=()), spread="one", sites=(0,))
+    hypothesis = SimpleNamespace(claims=(claim,))
+    fitted = SimpleNamespace(residuals=(residuals,), hypothesis=hypothesis, deviations=np.array(deviations))
+    return SimpleNamespace(fitted=fitted, newest=name)
+
+
+MEASURE = SimpleNamespace(records=(SimpleNamespace(test=np.ones(1600, dtype=bool)),))
+NOISE = np.random.default_rng(5).normal(size=(1600, 2))
+
+
+def test_a_gain_is_the_share_of_the_error_power_that_goes():
+    found = held_out_gain(MEASURE, candidate(NOISE), candidate(0.5 * NOISE))
+    assert (found.gain, found.low, found.high) == pytest.approx((0.75, 0.75, 0.75))
+
+
+def test_a_random_difference_has_a_gain_interval_around_zero():
+    other = np.random.default_rng(6).normal(size=(1600, 2))
+    found = held_out_gain(MEASURE, candidate(NOISE), candidate(other))
+    assert found.low < 0 < found.high
+
+
+POSITIONS = SimpleNamespace(response=SimpleNamespace(quantities=("position", "position")), position=None)
+
+
+@pytest.mark.parametrize(
+    ("name", "left", "something"),
+    [("free simulation", 1.01, False), ("free simulation", 0.9, True), ("predicted force", 1.01, True)],
+)
+def test_a_model_that_leaves_as_much_of_a_motion_as_its_mean_predicts_nothing(name, left, something):
+    record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=3.0 + 2.0 * NOISE, recording=POSITIONS)
+    measure = SimpleNamespace(name=name, records=(record,), unit=np.array([2.0, 2.0]), noise=np.full(2, 0.1))
+    assert predicts_something(measure, candidate(left * NOISE)) == something
+
+
+@pytest.mark.parametrize(("left", "idle", "something"), [(0.5, 1e-3, True), (0.5, 0.0, True), (1.5, 1e-3, False)])
+def test_an_idle_channel_does_not_say_whether_a_model_predicts_something(left, idle, something):
+    record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=NOISE * (1.0, idle), recording=POSITIONS)
+    measure = SimpleNamespace(name="free simulation", records=(record,), unit=np.ones(2), noise=np.full(2, 0.01))
+    assert predicts_something(measure, candidate(NOISE * (left, 0.02))) == something
+
+
+@pytest.mark.parametrize("name", ["free simulation", "predicted force"])
+@pytest.mark.parametrize(
+    ("left", "noise", "half"), [(0.69, 0.01, True), (0.72, 0.01, False), (0.72, 0.4, True), (0.8, 0.4, False)]
+)
+def test_a_name_needs_a_model_that_explains_half_of_what_is_no_noise(name, left, noise, half):
+    record = SimpleNamespace(test=np.ones(1600, dtype=bool), measured=3.0 + NOISE, recording=POSITIONS)
+    measure = SimpleNamespace(name=name, records=(record,), unit=np.ones(2), noise=np.full(2, noise))
+    assert explains_half(measure, candidate(left * NOISE)) == half
+
+
+def searched(after, rival=None):
+    context = SimpleNamespace(whole=MEASURE, with_test_score=lambda each: each)
+    rounds = ((after, *(() if rival is None else (rival,))),)
+    found = SimpleNamespace(steps=(after,), plain=candidate(NOISE), after=after, rounds=rounds)
+    return SimpleNamespace(context=context, found=found)
+
+
+@pytest.mark.parametrize(
+    ("after", "rival", "said"),
+    [
+        (candidate(0.3 * NOISE), None, ""),
+        (candidate(0.3 * NOISE), candidate(0.6 * NOISE, "backlash"), ""),
+        (candidate(0.3 * NOISE), candidate(0.3 * NOISE, "backlash"), "cannot tell it from backlash"),
+        (candidate(0.95 * NOISE), None, "not a third"),
+        (candidate(0.8 * NOISE), None, "the force balance does not confirm it"),
+        (candidate(1.2 * NOISE), None, "what varies between stretches"),
+        (candidate(0.3 * NOISE, deviations=(4.0,)), None, "at the end of its tolerance"),
+    ],
+)
+def test_a_rival_or_a_poor_prediction_is_an_objection_to_a_name(monkeypatch, after, rival, said):
+    monkeypatch.setattr(beside_given, "only_refines", lambda other, best: False)
+    found = objection(searched(after, rival), ())
+    assert said in found
+    assert bool(found) == bool(said)

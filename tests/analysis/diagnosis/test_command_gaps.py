@@ -1,0 +1,73 @@
+"""A command that a logger lost in places: bridged where it moves slowly, else cut, left where little stays."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.data.observed_parts import parts_of
+from analysis.diagnosis.prepare_recordings import bridge_gaps
+from equalizer.signals.recording import Recording
+from equalizer.signals.signal import Signal
+
+RATE_HZ = 500.0
+SAMPLES = 5000
+
+
+def recording(command) -> Recording:
+    samples = np.asarray(command, dtype=np.float64)[:, None]
+    return Recording(
+        "bench",
+        Signal(samples, RATE_HZ, "force", "N", ("fx",)),
+        Signal(np.random.default_rng(1).standard_normal((len(samples), 1)), RATE_HZ, "position", "m", ("x",)),
+    )
+
+
+def slow():
+    return np.sin(2 * np.pi * 2 * np.arange(SAMPLES) / RATE_HZ)
+
+
+def noise():
+    return np.random.default_rng(0).standard_normal(SAMPLES)
+
+
+def lost(command, *stretches):
+    found = np.array(command)
+    for start, stop in stretches:
+        found[start:stop] = np.nan
+    return found
+
+
+def test_short_gaps_of_a_slow_command_are_bridged_within_the_share_that_is_asked_for():
+    (found,), (said,) = bridge_gaps([recording(lost(slow(), (1000, 1003), (3000, 3001)))], ["a"])
+    assert np.abs(found.command.samples[:, 0] - slow()).max() < 0.02
+    assert parts_of(found) == ((0, SAMPLES),)
+    assert "2 gaps (4 samples) bridged" in said
+
+
+def test_gaps_of_a_fast_command_are_cut_out_and_what_is_known_stays():
+    command = noise()
+    (found,), (said,) = bridge_gaps([recording(lost(command, (1000, 1003), (3000, 3001)))], ["a"])
+    assert parts_of(found) == ((0, 1000), (1003, 3000), (3001, SAMPLES))
+    assert all(np.array_equal(found.command.samples[a:b, 0], command[a:b]) for a, b in parts_of(found))
+    assert "2 gaps (4 samples) cut out, so that 3 parts" in said
+
+
+def test_a_long_gap_of_a_slow_command_is_cut_within_the_parts_that_were_known():
+    parts = [{"start": 0, "stop": 1500}, {"start": 1500, "stop": SAMPLES}]
+    known = replace(recording(lost(slow(), (1200, 1600))), meta={"parts": parts})
+    (found,), _ = bridge_gaps([known], ["a"])
+    assert parts_of(found) == ((0, 1200), (1600, SAMPLES))
+
+
+def test_a_whole_command_is_not_touched_and_nothing_is_reported():
+    whole = recording(noise())
+    found, said = bridge_gaps([whole], ["a"])
+    assert found[0] is whole
+    assert said == ()
+
+
+def test_what_gaps_leave_little_of_stays_as_it_is_to_be_refused():
+    torn = recording(lost(noise(), *((k, k + 1) for k in range(0, SAMPLES, 20))))
+    found, said = bridge_gaps([torn], ["a"])
+    assert found[0] is torn
+    assert said == ()
