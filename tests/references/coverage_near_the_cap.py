@@ -1,4 +1,4 @@
-"""Bias and coverage of the primary analysis near the cap, by the people's curve and lapse rate: it goes on where it stopped.
+"""Bias and coverage of the primary analysis near the cap, by curve and lapse rate. It goes on where it stopped.
 
     python tests/references/coverage_near_the_cap.py FOLDER [SECONDS [SEED]]
     python tests/references/coverage_near_the_cap.py FOLDER 0     only prints what is there
