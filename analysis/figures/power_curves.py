@@ -10,17 +10,22 @@ from matplotlib.figure import Figure
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes
 from analysis.psychophysics.power.power_curve import CONFIDENCE, PowerPoint, Share
+from analysis.threshold_words import REVERSALS
 from equalizer.signals.signal import FloatArray
 
 _DESIRED_POWER = 80.0
 """Percent: what is usually asked for (J. Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988)."""
 _MARKER_STEP = 0.12
 """Between the curves' markers, in participants, so that their bars do not hide each other."""
+_ROOM = 1.5
+"""At either end, in participants."""
 
 
-def power_picture(points: Sequence[PowerPoint], effect_db: float, pair_hz: tuple[float, float]) -> Picture:
+def power_picture(
+    points: Sequence[PowerPoint], effect_db: float, pair_hz: tuple[float, float], means: str = REVERSALS.means
+) -> Picture:
     """points: one sample size each, at least one. effect_db: true difference, 0 for none, of the first frequency of
-    pair_hz from the second."""
+    pair_hz from the second. means: what thresholds of runs are, in the plural."""
     found = "finds the difference" if effect_db else "finds a difference that is not there (type-1 error)"
     return Picture(
         name="power",
@@ -28,21 +33,21 @@ def power_picture(points: Sequence[PowerPoint], effect_db: float, pair_hz: tuple
         f"between {pair_hz[0]:g} and {pair_hz[1]:g} Hz",
         caption=f"Above: share of the studies in which each analysis {found}. Below: share in which the primary "
         f"analysis's {100 * CONFIDENCE:g} % interval holds the true difference. Bars: 95 % intervals of the shares.",
-        figure=_draw(points, effect_db),
+        figure=_draw(points, effect_db, means),
         alternative="; ".join(
             f"{point.people} participants: found in {100 * point.primary.value:.0f} % by all answers in one model, in "
-            f"{100 * point.means.value:.0f} % by reversal means"
+            f"{100 * point.means.value:.0f} % by {means}"
             for point in points
         ),
     )
 
 
-def _draw(points: Sequence[PowerPoint], effect_db: float) -> Figure:
+def _draw(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
     figure = new_figure(6.6, 5.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     curves = (
         ("all answers in one model", BLUE, "o-", [point.primary for point in points]),
-        ("reversal means, paired", ORANGE, "s--", [point.means for point in points]),
+        (f"{means}, paired", ORANGE, "s--", [point.means for point in points]),
         ("as published (Tukey)", VERMILLION, "D:", [point.published for point in points]),
     )
     people = np.array([point.people for point in points], dtype=float)
@@ -57,6 +62,8 @@ def _draw(points: Sequence[PowerPoint], effect_db: float) -> Figure:
     below.set_ylabel("Covered (%)", fontsize=9)
     below.set_xlabel("Participants", fontsize=9)
     below.set_xticks(people)
+    # With a single size, or close ones, the markers of one size stay beside each other.
+    below.set_xlim(people.min() - _ROOM, people.max() + _ROOM)
     for axes in (above, below):
         plain_axes(axes)
     figure.legend(*above.get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8, frameon=False)

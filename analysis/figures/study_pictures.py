@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from analysis.figures.delivered import draw_delivered
 from analysis.figures.ellipsoids import draw_ellipsoids
+from analysis.figures.medians import draw_medians
 from analysis.figures.picture import Picture
 from analysis.figures.psychometric import draw_people_curves, draw_person_curves
 from analysis.figures.staircases import draw_staircases
@@ -14,6 +15,7 @@ from analysis.psychophysics.detection import above_detection
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.hierarchy.answers import count_answers
 from analysis.psychophysics.hierarchy.observed_shares import BIN_DB
+from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
 from analysis.threshold_words import threshold_words
@@ -114,6 +116,7 @@ def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
         figure=draw_people_curves(answers, primary),
     )
     return [
+        *([_medians_picture(primary, analysis.protocol.staircase.cap_n)] if primary else []),
         *([together] if together else []),
         *(
             Picture(
@@ -132,6 +135,19 @@ def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
             for number, subject in enumerate(answers.subjects, start=1)
         ),
     ]
+
+
+def _medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
+    return Picture(
+        name="medians",
+        title="Thresholds by the model of all answers",
+        caption=f"Black: the median participant with its {100 * primary.confidence:g} % interval. Above the cap no "
+        "size is known: an arrow from the one-sided bound, and people, hollow, on one line. An interval without an "
+        "upper mark goes on above the axis. People are joined by lines, as the model sees them: drawn towards the "
+        "others where their own answers say little. Diamond and thick line on the cap: the direction limit and its "
+        "interval, between the frequencies played alone.",
+        figure=draw_medians(primary, cap_n),
+    )
 
 
 def _file_name(subject: str) -> str:

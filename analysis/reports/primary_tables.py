@@ -1,18 +1,22 @@
 """The tables of the primary analysis in a study report."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
+from analysis.psychophysics.hierarchy.objective import LOG_SD_BOUNDS
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, newton_or_none
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.two_analyses import coverage_notes
 from analysis.reports.page import Section, Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, number, p_text, p_value, signed_number
+from analysis.wording import NONE, conjoin, number, p_text, p_value, signed_number
 
+AT_BOUND = 0.01
+"""Of the logarithm of a spread."""
 MEANING = (
     "One psychometric model of all answers: thresholds differ by frequency, by person, and by person at each "
     "frequency; slopes and likings for one answer differ by person. An answer at the cap is an answer like any other, "
@@ -89,6 +93,25 @@ def _overall(primary: PrimaryAnalysis) -> str:
         f"{number(primary.slope)} ({primary.family.value}), lapse rate {number(100 * primary.lapse, 1)} %, likings for "
         f"one answer {number(primary.criterion_sd)} (standard deviation, in units of d')."
         + ("" if primary.converged else " The search ended before it had settled: do not use these numbers.")
+        + undetermined_words(primary)
+    )
+
+
+def undetermined_words(primary: PrimaryAnalysis) -> str:
+    """A sentence with a space before it where a spread between people ended at the bound of its search; else nothing.
+    It happens with few people, whose answers hold a slope of 2 and one of 20 nearly equally probable."""
+    found = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
+    names = ("thresholds", "thresholds from frequency to frequency", "slopes", "likings for one answer")
+    at_bound = [
+        name
+        for name, spread, (_, highest) in zip(names, found, LOG_SD_BOUNDS, strict=True)
+        if math.log(spread) > highest - AT_BOUND
+    ]
+    if not at_bound:
+        return ""
+    return (
+        f" The answers do not tell how much people differ in their {conjoin(at_bound)}: the search ended at its bound. "
+        "Do not use the median slope, nor single curves."
     )
 
 

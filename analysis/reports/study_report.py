@@ -132,7 +132,7 @@ def _results(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Se
     )
     model = replace(
         primary_section(analysis),
-        pictures=tuple(picture for name, picture in by_name.items() if name.startswith("psychometric")),
+        pictures=tuple(picture for name, picture in by_name.items() if name.startswith(("medians", "psychometric"))),
     )
     return [thresholds, model, comparison]
 

@@ -15,8 +15,10 @@ class AnalysisSettings:
     primary: Annotated[
         Literal["undeclared", "hierarchical", "published"],
         Field(
-            description="Which analysis decides. 'hierarchical': one psychometric model of all answers; 'published': "
-            "one-way analysis of reversal means with Tukey's intervals. Default: undeclared, and the report says so."
+            description="Which analysis decides, and with it how the interval of the contrast is computed. "
+            "'hierarchical': one psychometric model of all answers, 95 % interval over people's differences in dB (t); "
+            "'published': one-way analysis of reversal means with Tukey's 95 % intervals. Default: undeclared, and the "
+            "report says so."
         ),
     ] = "undeclared"
     contrast_hz: Annotated[

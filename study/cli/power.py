@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,6 +16,7 @@ from study.errors import WrongUseError
 
 if TYPE_CHECKING:
     from analysis.psychophysics.power.felt_delivery import FeltDelivery
+    from analysis.psychophysics.power.power_curve import PowerPoint
     from analysis.psychophysics.power.simulated_study import Crowd
     from protocols.definition.staircase_rule import StaircaseRule
     from protocols.definition.study_protocol import StudyProtocol
@@ -80,7 +82,7 @@ def power(
     from study.cli.progress import bar
     from study.store.formats.protocol_files import read_study_protocol
     from study.workflows.cluster import cluster_workers
-    from study.workflows.planning.simulate_power import PowerPlan, power_lines, simulate_power
+    from study.workflows.planning.simulate_power import PowerPlan, simulate_power
     from study.workflows.worker_processes import worker_processes
 
     chosen = read_study_protocol(protocol, Path()).protocol
@@ -98,7 +100,7 @@ def power(
     if as_json:
         typer.echo(json.dumps([asdict(point) for point in points], indent=2))
         return
-    typer.echo("\n".join((*power_lines(points), "", _judged_words(plan), f"Figure: {out / 'figures' / 'power.png'}")))
+    typer.echo("\n".join((*_table(points, plan), f"Figure: {out / 'figures' / 'power.png'}")))
 
 
 def _compare(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_json: bool) -> None:
@@ -135,12 +137,16 @@ def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "
     return Crowd(frequencies_hz, tuple(raised_n if f == raised_hz else threshold_n for f in frequencies_hz))
 
 
-def _judged_words(plan: "PowerPlan") -> str:
+def _table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str]:
+    from analysis.threshold_words import threshold_words
+    from study.workflows.planning.simulate_power import power_lines
+
     first_hz, second_hz = plan.pair_hz
     which = (
         "the declared contrast" if plan.contrast_hz else "the highest frequency and the lowest; no contrast is declared"
     )
-    return f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {which}."
+    compared = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {which}."
+    return [*power_lines(points, threshold_words(plan.rule).means), "", compared]
 
 
 def _delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":

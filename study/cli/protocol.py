@@ -71,9 +71,14 @@ def texts(
 
 @app.command("lock")
 def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
-    """Fix a protocol before data come in: sessions in the data folder then refuse any other version of it."""
+    """Fix a protocol before data come in: sessions in the data folder then refuse any other version of it.
+
+    What it declares of the analysis, and what not, is said.
+    """
     from importlib.metadata import version
 
+    from analysis.psychophysics.two_analyses import declaration_text
+    from protocols.definition.study_protocol import StudyProtocol
     from study.devices.clock import RealClock
     from study.store.disk.privacy import make_folder
     from study.store.formats.protocol_files import lock_protocol, read_protocol
@@ -82,3 +87,5 @@ def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
     make_folder(data, private=True)
     path = lock_protocol(file, data, RealClock().utc(), version("hapteq"))
     typer.echo(str(path))
+    if isinstance(file.protocol, StudyProtocol):
+        typer.echo(f"Fixed with all else: {declaration_text(file.protocol.analysis)}", err=True)

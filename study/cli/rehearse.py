@@ -40,7 +40,7 @@ def rehearse(
     source = read_study_protocol(protocol_or_default(protocol, model), out)
     check_playable(source.protocol, model)
     rehearsal = Rehearsal(
-        source.protocol, source.text, subjects=subjects, seed=seed, data=out, model=model, observer=observer
+        source.protocol, source.text, subjects, seed, data=out, model=model, observer=observer, locked=source.locked
     )
     rehearsed_observer(rehearsal, 0)
     with cluster_if(scheduler) as cluster, bar(f"{subjects} simulated participants", total=subjects) as advance:

@@ -33,7 +33,7 @@ class StudyVerdict:
     primary_error_db: float
     """Estimated minus true difference."""
     means_found: bool
-    """The same by reversal means in dB, paired t test."""
+    """The same by reversal means in dB (Psi: posterior means, here and below), paired t test."""
     means_error_db: float
     published_found: bool
     """The same by reversal means in newtons, one-way ANOVA, Tukey's test of the pair."""

@@ -1,7 +1,9 @@
-"""Simulated studies in the form that the analyses take: counted answers, and reversal means."""
+"""Simulated studies in the form that the analyses take: counted answers, and thresholds of runs."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,16 +11,20 @@ from numpy.typing import NDArray
 from analysis.psychophysics.hierarchy.answers import Answers, tally
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, USUAL_SLOPE, Family
 from analysis.psychophysics.power.felt_delivery import FeltDelivery
+from analysis.psychophysics.power.psi_kernel import pack_psi, play_psi
 from analysis.psychophysics.power.staircase_kernel import (
     MOST_TRIALS,
-    PackedRule,
+    SAME_DB,
     Participant,
+    RunFound,
     Track,
     pack,
     play_run,
 )
+from analysis.psychophysics.thresholds import MAYBE_ABOVE
 from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import StaircaseRule
+from protocols.procedure.staircase import to_db
 
 _HABITS = 0x4AB1
 """Separates the draws of habits from the others, which stay those of studies without any."""
@@ -58,59 +64,89 @@ class Crowd:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedStudy:
-    """The answers and reversal means of a simulated study, beside the true thresholds."""
+    """The answers and thresholds of runs of a simulated study, beside the true thresholds."""
 
     answers: Answers
     threshold_n: FloatArray
-    """(people, frequencies): arithmetic mean of the averaged reversals in newtons; NaN without all reversals."""
+    """(people, frequencies): arithmetic mean of the averaged reversals in newtons; NaN without all reversals. Of Psi:
+    mean of the posterior, at most the cap."""
     threshold_db: FloatArray
     """(people, frequencies): mean of the same levels in dB."""
     cap_reversals: FloatArray
-    """(people, frequencies): averaged reversals that are peaks at the cap."""
+    """(people, frequencies): averaged reversals that are peaks at the cap; of Psi, 1 where a threshold is cut."""
     trials: int
     true_db: FloatArray
     """(people, frequencies)."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _RunThresholds:
+    """Of all runs (runs,)."""
+
+    newton: FloatArray
+    db: FloatArray
+    cap_reversals: FloatArray
+
+
 def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...]) -> SimulatedStudy:
     """The same seed gives the same study, on any machine and in any order of work."""
-    rng, k, packed = np.random.default_rng(seed), len(crowd.frequencies_hz), pack(rule)
-    own = np.broadcast_to(np.asarray(crowd.frequency_sd_db, dtype=np.float64), (k,))
-    true_db = 20.0 * np.log10(np.asarray(crowd.medians_n)) + crowd.person_sd_db * rng.standard_normal((people, 1))
-    true_db = true_db + own * rng.standard_normal((people, k))
-    slopes = (crowd.slope or USUAL_SLOPE[crowd.family]) * np.exp(crowd.slope_log_sd * rng.standard_normal(people))
-    criteria = crowd.criterion_sd * rng.standard_normal(people)
+    rng, k = np.random.default_rng(seed), len(crowd.frequencies_hz)
+    true_db, participants = _draw_people(crowd, people, rng)
     seeds = rng.integers(0, 2**32, size=(people, k), dtype=np.uint64)
-    t0, family = AT_THRESHOLD[crowd.family], FAMILIES.index(crowd.family)
-    participants = [
-        Participant(t0, slopes[person] * NEPER_PER_DB, true_db[person, place], crowd.lapse, criteria[person], family)
-        for person in range(people)
-        for place in range(k)
-    ]
     tracks = _empty_tracks(people * k, rule.reversals)
-    counts, turns = _play_sessions(crowd, packed, participants, seeds.ravel(), tracks, (*seed, _HABITS))
-    levels, sides, rights, peaks = tracks
+    found = _play_sessions(crowd, rule, participants, seeds.ravel(), tracks, (*seed, _HABITS))
+    counts = np.array([run.trials for run in found])
     played = np.arange(MOST_TRIALS) < counts[:, None]
     answers = tally(
         tuple(f"S{number + 1:03d}" for number in range(people)),
         crowd.frequencies_hz,
         np.repeat(np.arange(people * k), counts),
-        levels[played],
-        sides[played],
-        rights[played].astype(np.bool_),
+        tracks.level_db[played],
+        tracks.side[played],
+        tracks.right[played].astype(np.bool_),
     )
-    averaged = peaks[:, -rule.averaged_reversals :]
-    whole = np.where(turns == rule.reversals, 1.0, math.nan)
-    newtons = np.minimum(10.0 ** (averaged / 20.0), rule.cap_n)
-    shape = (people, k)
+    runs = (_posterior_means if rule.is_bayesian else _reversal_means)(rule, tracks, found)
     return SimulatedStudy(
         answers=answers,
-        threshold_n=(newtons.mean(axis=1) * whole).reshape(shape),
-        threshold_db=(averaged.mean(axis=1) * whole).reshape(shape),
-        cap_reversals=(averaged >= packed.cap_db - 1e-9).sum(axis=1).reshape(shape).astype(np.float64),
+        threshold_n=runs.newton.reshape(people, k),
+        threshold_db=runs.db.reshape(people, k),
+        cap_reversals=runs.cap_reversals.reshape(people, k),
         trials=int(counts.sum()),
         true_db=true_db,
     )
+
+
+def _draw_people(crowd: Crowd, people: int, rng: np.random.Generator) -> tuple[FloatArray, list[Participant]]:
+    """True thresholds (people, frequencies) in dB, and a participant for each run, person by person."""
+    k = len(crowd.frequencies_hz)
+    own = np.broadcast_to(np.asarray(crowd.frequency_sd_db, dtype=np.float64), (k,))
+    true_db = 20.0 * np.log10(np.asarray(crowd.medians_n)) + crowd.person_sd_db * rng.standard_normal((people, 1))
+    true_db = true_db + own * rng.standard_normal((people, k))
+    slopes = (crowd.slope or USUAL_SLOPE[crowd.family]) * np.exp(crowd.slope_log_sd * rng.standard_normal(people))
+    criteria = crowd.criterion_sd * rng.standard_normal(people)
+    t0, family = AT_THRESHOLD[crowd.family], FAMILIES.index(crowd.family)
+    return true_db, [
+        Participant(t0, slopes[person] * NEPER_PER_DB, true_db[person, place], crowd.lapse, criteria[person], family)
+        for person in range(people)
+        for place in range(k)
+    ]
+
+
+def _reversal_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFound]) -> _RunThresholds:
+    averaged = tracks.reversal_db[:, -rule.averaged_reversals :]
+    whole = np.where(np.array([run.reversals for run in found]) == rule.reversals, 1.0, math.nan)
+    newtons = np.minimum(10.0 ** (averaged / 20.0), rule.cap_n)
+    at_cap = averaged >= to_db(rule.cap_n) - SAME_DB
+    return _RunThresholds(
+        newtons.mean(axis=1) * whole, averaged.mean(axis=1) * whole, at_cap.sum(axis=1).astype(np.float64)
+    )
+
+
+def _posterior_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFound]) -> _RunThresholds:
+    """As `thresholds.threshold_of` has them."""
+    db = np.minimum([run.mean_db for run in found], to_db(rule.cap_n))
+    cut = np.array([run.above_cap for run in found]) > MAYBE_ABOVE
+    return _RunThresholds(np.minimum(10.0 ** (db / 20.0), rule.cap_n), db, cut.astype(np.float64))
 
 
 def _feeling(participant: Participant, delivery: FeltDelivery | None, place: int) -> Participant:
@@ -133,15 +169,16 @@ def _empty_tracks(runs: int, reversals: int) -> Track:
 
 def _play_sessions(
     crowd: Crowd,
-    packed: PackedRule,
+    rule: StaircaseRule,
     participants: list[Participant],
     seeds: NDArray[np.uint64],
     tracks: Track,
     key: tuple[int, ...],
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Fills the tracks, person by person with their habits. Returns trials and reversals of each run (runs,)."""
+) -> list[RunFound]:
+    """Fills the tracks, person by person with their habits. Returns what each run came to, in the order of tracks."""
     habits, k = np.random.default_rng(key), len(crowd.frequencies_hz)
-    counts, turns = (np.zeros(len(participants), dtype=np.intp) for _ in range(2))
+    play = partial(play_psi, pack_psi(rule)) if rule.is_bayesian else partial(play_run, pack(rule))
+    found = [RunFound(0, 0)] * len(participants)
     for first in range(0, len(participants), k):
         guesses, drift = habits.random() < crowd.guessers, 0.01 * crowd.criterion_drift_sd * habits.standard_normal()
         before = 0
@@ -153,6 +190,6 @@ def _play_sessions(
             if guesses:
                 participant = participant._replace(lapse=0.5)
             track = Track(*(rows[run] for rows in tracks))
-            counts[run], turns[run] = play_run(packed, participant, int(seeds[run]), track)
-            before += int(counts[run])
-    return counts, turns
+            found[run] = RunFound(*play(participant, int(seeds[run]), track))
+            before += found[run].trials
+    return found

@@ -97,7 +97,7 @@ class Track(NamedTuple):
     side: FloatArray
     right: FloatArray
     reversal_db: FloatArray
-    """(reversals,)"""
+    """(reversals,); not filled by Psi."""
 
 
 @njit(cache=True)
@@ -154,24 +154,41 @@ def look_again(middle: float, lapse: float, unsure: float, left: int) -> tuple[b
     return total > 0.0, left
 
 
+class RunFound(NamedTuple):
+    """What a run came to."""
+
+    trials: int
+    reversals: int
+    mean_db: float = math.nan
+    """Of the threshold's posterior, for a run by Psi, as the next."""
+    above_cap: float = math.nan
+    """Probability that the threshold lies above the cap."""
+
+
 @njit(cache=True)
-def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> tuple[int, int]:
-    """Plays until the run ends, and fills the track. Returns how many trials and reversals there were."""
+def give_answer(person: Participant, level_db: float, trial: int, left: int) -> tuple[float, bool, int]:
+    """What is shown (1 or -1) at the trial of the run, whether the answer is right, and how many repeats are left."""
+    s = 1.0 if np.random.random() < 0.5 else -1.0
+    felt = felt_db(person, level_db, s > 0.0, trial)
+    a = evidence(person.t0 + person.pace_per_db * (felt - person.threshold_db), person.family) - s * (
+        person.criterion + person.criterion_per_trial * (person.trials_before + trial)
+    )
+    if person.unsure > 0.0:
+        answer, left = look_again(a, person.lapse, person.unsure, left)
+        return s, answer, left
+    p = person.lapse + (1.0 - 2.0 * person.lapse) * 0.5 * math.erfc(-a / math.sqrt(2.0))
+    return s, np.random.random() < p, left
+
+
+@njit(cache=True)
+def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> RunFound:
+    """Plays until the run ends, and fills the track."""
     np.random.seed(seed)
     level, heading, good, bad, trials, reversals = rule.start_db, 0, 0, 0, 0, 0
     left = person.repeats
     limit = min(rule.trial_limit, MOST_TRIALS) if rule.trial_limit > 0 else MOST_TRIALS
     while reversals < rule.reversals and trials < limit:
-        s = 1.0 if np.random.random() < 0.5 else -1.0
-        felt = felt_db(person, level, s > 0.0, trials)
-        a = evidence(person.t0 + person.pace_per_db * (felt - person.threshold_db), person.family) - s * (
-            person.criterion + person.criterion_per_trial * (person.trials_before + trials)
-        )
-        if person.unsure > 0.0:
-            answer, left = look_again(a, person.lapse, person.unsure, left)
-        else:
-            p = person.lapse + (1.0 - 2.0 * person.lapse) * 0.5 * math.erfc(-a / math.sqrt(2.0))
-            answer = np.random.random() < p
+        s, answer, left = give_answer(person, level, trials, left)
         track.level_db[trials], track.side[trials], track.right[trials] = level, s, answer
         trials += 1
         good, bad = (good + 1, 0) if answer else (0, bad + 1)
@@ -193,4 +210,4 @@ def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> 
             reversals += 1
         heading = turn
         level = min(level + turn * size, rule.cap_db)
-    return trials, reversals
+    return RunFound(trials, reversals, math.nan, math.nan)

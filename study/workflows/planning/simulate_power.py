@@ -17,6 +17,7 @@ from analysis.psychophysics.power.power_curve import (
     true_difference_db,
 )
 from analysis.psychophysics.power.simulated_study import Crowd
+from analysis.threshold_words import REVERSALS, threshold_words
 from protocols.definition.staircase_rule import StaircaseRule
 from study.errors import StudyError, WrongUseError
 from study.store.disk.file_errors import CannotWriteError
@@ -65,13 +66,7 @@ def simulate_power(
 
     Raises StudyError where `out` belongs to another plan, and CannotWriteError.
     """
-    if plan.rule.is_bayesian:
-        raise WrongUseError(
-            "Whole studies are simulated with an up-down staircase",
-            "The protocol lets Psi choose the levels (staircase.bayesian).",
-            "Set staircase.bayesian.trials to 0 here; hapteq power --compare weighs Psi against the staircase.",
-        )
-    if plan.rule.trial_limit:
+    if plan.rule.trial_limit and not plan.rule.is_bayesian:
         raise WrongUseError(
             "This staircase has a trial limit",
             "Runs that it stops have no threshold, and the published analysis cannot be judged without them.",
@@ -90,9 +85,9 @@ def simulate_power(
     # In the order of the plan, not of finishing: sums of the same numbers are then the same to the bit.
     points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
     payload = {"plan": _plan_facts(plan), "judged_hz": plan.pair_hz, "points": [asdict(point) for point in points]}
-    effect_db = true_difference_db(plan.crowd, plan.contrast_hz)
+    effect_db, means = true_difference_db(plan.crowd, plan.contrast_hz), threshold_words(plan.rule).means
     write_json(out / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
-    write_pictures(out / "figures", (power_picture(points, effect_db, plan.pair_hz),))
+    write_pictures(out / "figures", (power_picture(points, effect_db, plan.pair_hz, means),))
     return points
 
 
@@ -154,17 +149,19 @@ def _append(path: Path, row: dict[str, object]) -> None:
         raise CannotWriteError(path, problem) from problem
 
 
-def power_lines(points: Sequence[PowerPoint]) -> list[str]:
-    """A table for the terminal."""
+def power_lines(points: Sequence[PowerPoint], means: str = REVERSALS.means) -> list[str]:
+    """A table for the terminal. means: what thresholds of runs are, in the plural."""
+    paired = f"{means}, paired"
+    width = max(24, len(paired))
     lines = [
-        f"{'people':>6}  {'all answers in one model':>26}  {'reversal means, paired':>24}  "
+        f"{'people':>6}  {'all answers in one model':>26}  {paired:>{width}}  "
         f"{'as published (Tukey)':>24}  {'95 % interval covers':>22}  bias dB (model, means)"
     ]
     for point in points:
         shares = (point.primary, point.means, point.published, point.coverage)
         texts = [_percent(share) for share in shares]
         lines.append(
-            f"{point.people:6}  {texts[0]:>26}  {texts[1]:>24}  {texts[2]:>24}  {texts[3]:>22}  "
+            f"{point.people:6}  {texts[0]:>26}  {texts[1]:>{width}}  {texts[2]:>24}  {texts[3]:>22}  "
             f"{point.primary_bias_db:+.2f}, {point.means_bias_db:+.2f}"
         )
     return lines

@@ -42,6 +42,8 @@ class Rehearsal:
     """Identified model that equalizes the stimuli."""
     observer: str = "person"
     """A kind of population (`study.participants.population.KINDS`), or an observer that all of them are."""
+    locked: bool = False
+    """Whether the protocol was locked before the rehearsal began."""
 
 
 def rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
@@ -142,7 +144,7 @@ def _play_new(rehearsal: Rehearsal, number: int) -> ConductedSitting:
     plan = SessionPlan(
         protocol=rehearsal.protocol,
         protocol_text=rehearsal.protocol_text,
-        protocol_locked=False,
+        protocol_locked=rehearsal.locked,
         subject=subject_code(number),
         observer=observer.name,
         seed=seed,

@@ -36,3 +36,16 @@ def test_the_caption_says_that_without_an_effect_each_find_is_an_error():
 
 def test_the_title_says_which_frequencies_are_compared():
     assert "3 dB between 45 and 35 Hz" in power_picture([point(10)], 3.0, (45.0, 35.0)).title
+
+
+def test_markers_of_a_single_size_stay_together():
+    above, below = power_picture([point(10)], 3.0, (45.0, 5.0)).figure.axes
+    places = [container.lines[0].get_xdata()[0] for container in above.containers]
+    low, high = below.get_xlim()
+    assert np.ptp(places) < 0.1 * (high - low)
+
+
+def test_means_of_runs_are_named_as_what_they_are():
+    picture = power_picture([point(10)], 3.0, (45.0, 5.0), "Psi's posterior means")
+    assert picture.figure.axes[0].get_legend_handles_labels()[1][1] == "Psi's posterior means, paired"
+    assert "by Psi's posterior means" in picture.alternative

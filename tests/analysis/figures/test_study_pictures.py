@@ -45,8 +45,8 @@ def markers(figure: Figure) -> list[str]:
 
 def test_a_study_has_its_figures_in_the_order_of_the_report(draw, simulate_study):
     assert list(draw(simulate_study(subjects=3))) == [
-        "thresholds", "units", "psychometric", "psychometric-1-s01", "psychometric-2-s02", "psychometric-3-s03",
-        "delivered", "staircases-1-s01", "staircases-2-s02", "staircases-3-s03",
+        "thresholds", "units", "medians", "psychometric", "psychometric-1-s01", "psychometric-2-s02",
+        "psychometric-3-s03", "delivered", "staircases-1-s01", "staircases-2-s02", "staircases-3-s03",
     ]  # fmt: skip
 
 

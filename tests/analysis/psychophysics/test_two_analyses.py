@@ -76,6 +76,8 @@ def test_what_was_declared_and_what_was_not_is_reported():
     said = declaration_text(AnalysisSettings("hierarchical", (45.0, 5.0), 10))
     assert "hierarchical model" in said and "45 Hz minus 5 Hz" in said and "participants: 10" in said
     assert "Not declared: exclusions." in said
+    assert "pseudo-thresholds in dB, paired" in said
+    assert "Tukey's of means of runs in newtons" in declaration_text(AnalysisSettings("published"))
     assert "Not declared" not in declaration_text(
         AnalysisSettings("published", (45.0, 5.0), 10, ("No participant is left out.",))
     )

@@ -92,7 +92,7 @@ def test_a_full_study_is_one_page_that_needs_nothing_else(report, simulate_study
     structure = parsed(html)
     assert structure.outside == []
     assert [i for i, n in Counter(structure.ids).items() if n > 1] == []
-    assert structure.tags["figure"] == structure.tags["svg"] == 3 + 3 + 5
+    assert structure.tags["figure"] == structure.tags["svg"] == 4 + 3 + 5
     assert structure.tags["script"] == 0
     for words in (
         "Individual thresholds (N)", "comparison interval", "Tukey-Kramer", "Greenhouse-Geisser", "Friedman",

@@ -70,9 +70,10 @@ def test_a_finished_session_is_said_to_be_finished(run, data):
 
 def test_a_locked_protocol_that_changed_is_refused_before_a_session_begins(run, small_file, tmp_path):
     data = tmp_path / "d"
-    code, out, _ = run("protocol", "lock", small_file, "--data", data)
+    code, out, err = run("protocol", "lock", small_file, "--data", data)
     assert code == 0
     assert out.strip().endswith("small.lock.json")
+    assert "declares no primary analysis, contrast, sample size or exclusions" in " ".join(err.split())
     assert run("validate", data / "small.lock.json")[0] == 0
     assert run("study", "--protocol", small_file, "--observer", "ideal", "--data", data)[0] == 0
     opened = json.loads((data / "ideal1_001" / "events.jsonl").read_text().splitlines()[0])

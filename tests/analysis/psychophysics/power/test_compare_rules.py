@@ -73,13 +73,15 @@ def test_sessions_analyse_such_runs(simulate):
     assert guesser.censored and guesser.threshold_n <= 3.0
 
 
-def test_the_command_prints_each_rule_and_refuses_whole_studies(tmp_path, monkeypatch):
+def test_the_command_prints_each_rule_and_simulates_whole_studies_by_psi(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     told = CliRunner().invoke(app, ["power", "--compare", "--studies", "10", "--json"])
     assert [row["rule"] for row in json.loads(told.stdout)][-1] == "Psi, 60 trials"
     assert not list(tmp_path.iterdir())
     text = dump_protocol(replace(protocol := read_study_protocol("direction_threshold").protocol, staircase=RULE))
     (tmp_path / "mine.toml").write_text(text.replace(f'name = "{protocol.name}"', 'name = "mine"'))
-    refused = CliRunner().invoke(app, ["power", "--protocol", "mine.toml", "--studies", "10", "--subjects", "5"])
-    assert refused.exit_code != 0
-    assert "hapteq power --compare" in str(refused.exception or refused.output)
+    whole = CliRunner().invoke(app, ["power", "--protocol", "mine.toml", "--studies", "10", "--subjects", "3"])
+    assert whole.exit_code == 0, whole.output
+    assert "Psi's posterior means, paired" in whole.stdout and "reversal" not in whole.stdout
+    (point,) = json.loads((tmp_path / "power" / "power.json").read_text())["points"]
+    assert point["trials_per_person"] == 5 * 40

@@ -52,7 +52,7 @@ def test_a_compiled_run_is_that_of_the_observer_of_sessions(delivery, threshold_
     who = _feeling(Participant(t0, pace, threshold_db, 0.03, 0.2, 0), delivery, 0)
     for seed in range(8):
         track = Track(*(np.empty(MOST_TRIALS) for _ in range(3)), np.full(PUBLISHED.reversals, np.nan))
-        n, _ = play_run(pack(PUBLISHED), who, seed, track)
+        n, *_ = play_run(pack(PUBLISHED), who, seed, track)
         slow = slow_run(delivery, threshold_n, seed)
         assert n == len(slow)
         np.testing.assert_allclose(track.level_db[:n], [level_db for level_db, _, _ in slow], atol=1e-9)

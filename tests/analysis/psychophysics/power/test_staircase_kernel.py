@@ -30,7 +30,7 @@ def test_levels_and_reversals_are_those_of_step(rule, threshold_n):
         level, side, right = np.empty(MOST_TRIALS), np.empty(MOST_TRIALS), np.empty(MOST_TRIALS)
         turns = np.full(rule.reversals, np.nan)
         who = Participant(AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, 20 * np.log10(threshold_n), 0.02, 0.1, 0)
-        trials, reversals = play_run(pack(rule), who, seed, Track(level, side, right, turns))
+        trials, reversals, *_ = play_run(pack(rule), who, seed, Track(level, side, right, turns))
         state = begin(rule)
         for index in range(trials):
             assert not is_finished(rule, state)
@@ -62,7 +62,7 @@ def test_shares_are_those_of_the_model_with_lapses_and_a_criterion():
     counts = np.zeros((2, 2))
     for seed in range(10):
         who = Participant(AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, 0.0, 0.05, 0.4, 0)
-        n, _ = play_run(pack(rule), who, seed, Track(level, side, right, np.empty(100)))
+        n, *_ = play_run(pack(rule), who, seed, Track(level, side, right, np.empty(100)))
         for index, sign in enumerate((1.0, -1.0)):
             shown = side[:n] == sign
             counts[index] += shown.sum(), right[:n][shown].sum()

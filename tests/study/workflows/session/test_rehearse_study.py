@@ -12,6 +12,7 @@ from study.errors import StudyError, UserInterruptError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.sessions.archive import session_folders
 from study.store.sessions.event_log import read_log
+from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study, subject_seed
 
@@ -78,6 +79,13 @@ def equalized(small_text, tmp_path) -> Rehearsal:
     write_identified_model(tmp_path / "model.h5", model)
     text = small_text.replace("[stimulus]\n", '[stimulus]\nquantity = "delivered_acceleration"\n')
     return Rehearsal(load_protocol(text, "small.toml"), text, 1, 5, tmp_path / "r", tmp_path / "model.h5")
+
+
+@pytest.mark.parametrize("locked", [False, True])
+def test_a_rehearsal_says_whether_its_protocol_was_locked(sitter, locked):
+    rehearsal = Rehearsal(sitter.protocol, sitter.text, subjects=1, seed=5, data=sitter.data, locked=locked)
+    rehearse_study(rehearsal, workers=1, on_finished=lambda _: None)
+    assert collect_sessions(sitter.data).locked.startswith("yes" if locked else "no")
 
 
 def test_a_rehearsal_does_not_continue_with_another_model(tmp_path, equalized):

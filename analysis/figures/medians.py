@@ -1,0 +1,114 @@
+"""Medians of the primary analysis with their intervals, the people it sees, and the direction limit."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from analysis.figures.style import (
+    BLACK,
+    CUT_MARKER,
+    GREY,
+    PAGE_IN,
+    new_figure,
+    participant_colour,
+    participant_marker,
+    plain_axes,
+    ratio_ticks,
+)
+from analysis.figures.thresholds import draw_threshold
+from analysis.psychophysics.hierarchy.inference import DirectionLimit, MedianThreshold
+from analysis.psychophysics.hierarchy.primary import PersonEstimate, PrimaryAnalysis
+
+_SPREAD = 0.5
+"""Width taken by the people at one frequency, in steps between frequencies."""
+_ABOVE, _TOP = 1.12, 1.45
+"""Of the cap: the line of those above it, and the end of the axis."""
+_LEGEND_LIMIT = 24
+"""Most people for whom there is a legend."""
+
+
+def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
+    """Over newtons on a logarithmic axis. Above the cap nothing has a size: people stand on one line, hollow with an
+    arrow, and a median is an arrow from its one-sided bound."""
+    figure = new_figure(PAGE_IN, 4.2)
+    axes = figure.add_subplot()
+    plain_axes(axes)
+    axes.set_yscale("log")
+    top, lowest = _TOP * cap_n, _lowest(primary)
+    axes.set_ylim(lowest, top)
+    ratio_ticks(axes.yaxis, lowest, cap_n)
+    axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)
+    places = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(primary.persons))
+    for number, person in enumerate(primary.persons):
+        _draw_person(axes, person, number, places[number], cap_n)
+    for place, median in enumerate(primary.medians):
+        _draw_median(axes, place, median, (lowest, top))
+    _draw_limit(axes, primary.limit, primary.frequencies_hz, cap_n)
+    axes.set_xticks(range(len(primary.frequencies_hz)), [f"{f:g}" for f in primary.frequencies_hz])
+    axes.set_xlim(-0.6, len(primary.frequencies_hz) - 0.4)
+    axes.set_xlabel("Frequency (Hz)")
+    axes.set_ylabel("Threshold (N)")
+    figure.legend(handles=_legend(primary, cap_n), loc="outside right upper", fontsize=8.5, frameon=False)
+    return figure
+
+
+def _lowest(primary: PrimaryAnalysis) -> float:
+    people = [value for person in primary.persons for value in person.thresholds_n]
+    return 0.85 * min(*people, *(median.lower_n or median.newton for median in primary.medians))
+
+
+def _draw_person(axes: Axes, person: PersonEstimate, number: int, shift: float, cap_n: float) -> None:
+    shown = [
+        _ABOVE * cap_n if above else value for value, above in zip(person.thresholds_n, person.above_cap, strict=True)
+    ]
+    at = np.arange(len(shown)) + shift
+    axes.plot(at, shown, "-", color=participant_colour(number), linewidth=0.7, alpha=0.45, zorder=1)
+    for x, value, above in zip(at, shown, person.above_cap, strict=True):
+        draw_threshold(axes, float(x), value, number, above)
+
+
+def _draw_median(axes: Axes, place: int, median: MedianThreshold, ends: tuple[float, float]) -> None:
+    """ends: of the axis."""
+    if median.above_cap:
+        begin = ends[0] if median.lower_n is None else median.lower_n
+        axes.annotate("", (place, ends[1]), xytext=(place, begin), zorder=4,
+                      arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.6, "shrinkA": 0,
+                                  "shrinkB": 0})  # fmt: skip
+        if median.lower_n is not None:
+            axes.plot(place, begin, "_", color=BLACK, markersize=9, markeredgewidth=1.6, zorder=4)
+        return
+    axes.plot(place, median.newton, "_", color=BLACK, markersize=22, markeredgewidth=2.4, zorder=4)
+    if median.lower_n is not None and median.upper_n is not None:
+        bars = [[median.newton - median.lower_n], [median.upper_n - median.newton]]
+        axes.errorbar(place, median.newton, yerr=bars, fmt="none", color=BLACK, elinewidth=1.6, capsize=4, zorder=4)
+
+
+def _draw_limit(axes: Axes, limit: DirectionLimit, frequencies_hz: tuple[float, ...], cap_n: float) -> None:
+    if limit.frequency_hz is None:
+        return
+    ends = (limit.lower_hz or frequencies_hz[0], limit.frequency_hz, limit.upper_hz or frequencies_hz[-1])
+    low, at, high = np.interp(np.log(ends), np.log(frequencies_hz), np.arange(len(frequencies_hz)))
+    axes.plot([low, high], [cap_n, cap_n], "-", color=BLACK, linewidth=3.2, alpha=0.75, solid_capstyle="butt", zorder=3)
+    axes.plot(at, cap_n, "D", color="white", markeredgecolor=BLACK, markeredgewidth=1.6, markersize=8, zorder=6)
+
+
+def _legend(primary: PrimaryAnalysis, cap_n: float) -> list[Line2D]:
+    percent = f"{100 * primary.confidence:g} %"
+    handles = [
+        Line2D([], [], color=BLACK, marker="_", markersize=12, markeredgewidth=2.4, linewidth=0,
+               label=f"median participant,\n{percent} interval")
+    ]  # fmt: skip
+    if any(median.above_cap for median in primary.medians):
+        handles.append(Line2D([], [], color=BLACK, marker=CUT_MARKER, linewidth=0, markersize=10,
+                              label=f"median above the cap:\n{percent} lower bound"))  # fmt: skip
+    if primary.limit.frequency_hz is not None:
+        handles.append(Line2D([], [], color=BLACK, marker="D", markerfacecolor="white", markersize=7, linewidth=3.2,
+                              label=f"direction limit,\n{percent} interval"))  # fmt: skip
+    handles.append(Line2D([], [], color=GREY, linestyle="--", linewidth=1.2, label=f"cap {cap_n:g} N"))
+    if len(primary.persons) <= _LEGEND_LIMIT:
+        handles += [
+            Line2D([], [], color=participant_colour(n), marker=participant_marker(n), linewidth=0, label=person.subject)
+            for n, person in enumerate(primary.persons)
+        ]
+    return handles
