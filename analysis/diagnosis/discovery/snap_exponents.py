@@ -11,7 +11,7 @@ from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.intervals import sensitivity_to_all, standard_errors
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
-from analysis.diagnosis.search.search_context import FIRST_ROUNDS, SearchContext, sensitivity_at
+from analysis.diagnosis.search.search_context import FIRST_ROUNDS, SearchContext
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
 from equalizer.effects.discovered_law import law_channels, law_effect, law_values
 from equalizer.laws.law import Law
@@ -25,13 +25,14 @@ _LIMIT = re.compile(r"(\w+) \+ p0\*\((.+) - \1\)")
 def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
     """The fit repeated with exponents held at whole or half numbers; unchanged where none is near one, or where that
     costs too much."""
-    known = sensitivity_at(context, fitted.deviations, fitted.hypothesis)
+    t = len(fitted.deviations)
     of_all = sensitivity_to_all(context.measure, context.tuning, fitted.deviations, fitted.hypothesis, context.map_)
-    errors = standard_errors(context.measure, fitted, of_all)[len(context.tuning.names) :]
+    errors = standard_errors(context.measure, fitted, of_all)[t:]
     plain = _with_simple_exponents(context, fitted.hypothesis, errors)
     if plain is None:
         return fitted
     start = evaluate_fit(context.measure, context.tuning, fitted.deviations, plain)
+    known = replace(of_all, columns=of_all.columns[:t], squares=of_all.squares[:t, :t])
     found = fit(context.measure, context.tuning, start, known, FIRST_ROUNDS)
     return found if found.cost <= fitted.cost * (1 + LAW_SNAP) else fitted
 

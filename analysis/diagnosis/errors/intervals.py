@@ -7,9 +7,9 @@ proportional columns, and the curvature in one-sided differences would count as 
 
 Noise: sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches longer than the residuals'
 correlation time. Where a drive repeats, so does what a model cannot reproduce: the same stretch of all periods of a
-segment is one cluster (Liang and Zeger, Biometrika 73:13, 1986). Systematic errors: no law is exact, so that another
-level or axis would give other numbers; delete-one jackknife over segments (Efron and Stein, Ann. Stat. 9:586, 1981),
-each estimate by one Gauss-Newton step,
+segment is one cluster (Liang and Zeger, Biometrika 73:13, 1986), where that shows more. Systematic errors: no law is
+exact, so that another level or axis would give other numbers; delete-one jackknife over segments (Efron and Stein, Ann.
+Stat. 9:586, 1981), each estimate by one Gauss-Newton step,
 
     theta_g - theta = -(A - A_g)^-1 b_g,   A = sum of A_g + prior,   A_g = X_g X_g',   b_g = X_g r_g.
 """
@@ -27,6 +27,7 @@ from analysis.diagnosis.errors.output_error import MOVED, Fitted, Sensitivity, r
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.noise.periods import settled_periods
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
+from equalizer.effects.effect import Structure
 from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
@@ -42,16 +43,20 @@ error."""
 FINISHING = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
 """As `DAMPINGS`; less, so that the calibration decides along a valley that the data leave flat."""
 MOST_ROUNDS, STEPS = 4, 3
-"""Times that the sensitivity is computed at most, and steps with each."""
+"""Rounds at most, each with a sensitivity of its own, and steps of each."""
+FINER_LINEAR, FINER = 0.02, 0.2
+"""Steps of the central differences, over those of a search: of a linear simulation, where what curvature remains is the
+only error; and under effects with thresholds or solved forces, whose own errors a short step would magnify."""
 
 
 def sensitivity_to_all(
     measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis, map_: Mapper = map
 ) -> Sensitivity:
     """Sensitivity (t + numbers, samples) to the model's parameters, then to the hypothesis's numbers, by central
-    differences; one-sided where the other side gives no valid model, and 0 for numbers at a bound."""
-    t, numbers = len(deviations), hypothesis.numbers
-    held = _at_an_end(hypothesis)
+    differences; one-sided at a bound and where the other side gives no valid model."""
+    t, placed = len(deviations), hypothesis.placed_effects()
+    linear = all(isinstance(each.effect.acts, Structure) for each in placed)
+    finer = FINER_LINEAR if linear else FINER
 
     def moved(number: int, by: float) -> FloatArray | None:
         at, point = deviations.copy(), hypothesis.point.copy()
@@ -64,28 +69,27 @@ def sensitivity_to_all(
         return left if np.isfinite(left).all() else None
 
     def column(number: int) -> FloatArray:
-        if number >= t and held[number - t]:
+        sides = [(by, moved(number, by)) for by in _both_ways(hypothesis, number - t, finer)]
+        valid = [(by, left) for by, left in sides if left is not None]
+        if len(valid) == 1 and (here := moved(number, 0.0)) is not None:
+            valid.append((0.0, here))
+        if len(valid) < 2 or valid[0][0] == valid[1][0]:
             return np.zeros(samples)
-        sides = [(by, left) for by in _both_ways(hypothesis, number - t) if (left := moved(number, by)) is not None]
-        if len(sides) == 1:
-            sides.append((0.0, residuals_to_fit(measure, measure.residuals(tuning.tune(deviations), placed))))
-        if not sides:
-            return np.zeros(samples)
-        (low, before), (high, after) = sides
+        (low, before), (high, after) = valid
         return np.asarray((before - after) / (high - low))
 
-    placed = hypothesis.placed_effects()
     samples = sum(int(record.fit.sum()) * record.measured.shape[1] for record in measure.records)
-    columns = np.array(list(map_(column, range(t + len(numbers))))).reshape(t + len(numbers), samples)
+    count = t + len(hypothesis.numbers)
+    columns = np.array(list(map_(column, range(count)))).reshape(count, samples)
     return Sensitivity(deviations, columns, columns @ columns.T)
 
 
-def _both_ways(hypothesis: Hypothesis, number: int) -> tuple[float, float]:
+def _both_ways(hypothesis: Hypothesis, number: int, finer: float) -> tuple[float, float]:
     """Steps down and up within the bounds. number: of the hypothesis; below 0: of the model."""
     if number < 0:
-        return -MOVED, MOVED
+        return -finer * MOVED, finer * MOVED
     (low, high), at = hypothesis.numbers[number].bounds, hypothesis.point[number]
-    step = hypothesis.numbers[number].move
+    step = finer * hypothesis.numbers[number].move
     return max(-step, low - at), min(step, high - at)
 
 
@@ -97,7 +101,8 @@ def finish_fit(
     time_left: TimeBudget,
 ) -> tuple[Fitted, Sensitivity]:
     """The fit at its minimum, and the sensitivity to all its numbers there. sensitivity_of: as `sensitivity_to_all`;
-    computed once, and again after steps that lowered the sum of squares by more than `FINISHED`."""
+    computed once, and again after steps that lowered the sum of squares by more than `FINISHED`, also where no time is
+    left for further steps."""
     known, samples = sensitivity_of(fitted), len(residuals_to_fit(measure, fitted.residuals))
     for _ in range(MOST_ROUNDS):
         begun = fitted.cost
@@ -108,9 +113,11 @@ def finish_fit(
             gained, fitted = samples * (fitted.cost - better.cost), better
             if gained < FINISHED:
                 break
-        if samples * (begun - fitted.cost) < FINISHED or not time_left():
+        if not samples * (begun - fitted.cost) >= FINISHED:  # nor where both costs are infinite
             break
         known = sensitivity_of(fitted)
+        if not time_left():
+            break
     return fitted, known
 
 
@@ -130,22 +137,28 @@ def _with_calibration(squares: FloatArray, t: int) -> FloatArray:
 
 def standard_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray:
     """(t + numbers,): standard errors of the deviations and of the hypothesis's point; 0 for numbers at a bound. known:
-    sensitivity to all numbers (`sensitivity_to_all`)."""
-    t = len(fitted.deviations)
-    scores = _scores(measure, known, residuals_to_fit(measure, fitted.residuals))
-    middle = _with_calibration(scores @ scores.T, t)
-    information = _with_calibration(known.squares, t)
+    sensitivity to all numbers (`sensitivity_to_all`).
+
+    Scores sum to zero at the minimum, so that few clusters show too little: the larger of the errors with and without
+    periods in one cluster is taken."""
+    t, free = len(fitted.deviations), _free(fitted)
+    errors = residuals_to_fit(measure, fitted.residuals)
+    information = _with_calibration(known.squares * np.outer(free, free), t)
     scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
-    return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ middle @ inverse), 0.0)))
+    variances = []
+    for folded in (False, True):
+        scores = _scores(measure, known, errors, folded) * free[:, None]
+        variances.append(np.diagonal(inverse @ _with_calibration(scores @ scores.T, t) @ inverse))
+    return np.asarray(np.sqrt(np.maximum(np.max(variances, axis=0), 0.0)))
 
 
 def segment_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray | None:
     """(t + numbers,): jackknife standard errors over segments; None where there is one segment. known: as above."""
-    errors = residuals_to_fit(measure, fitted.residuals)
+    errors, free = residuals_to_fit(measure, fitted.residuals), _free(fitted)
     products, scores = [], []
     for begin, end in _segments(measure):
-        moves = known.over(begin, end)
+        moves = known.over(begin, end) * free[:, None]
         products.append(moves @ moves.T)
         scores.append(moves @ errors[begin:end])
     if len(products) < 2:
@@ -171,18 +184,19 @@ def _segments(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
         first += width * len(samples)
 
 
-def _at_an_end(hypothesis: Hypothesis) -> Mask:
-    ends = [number.bounds for number in hypothesis.numbers]
-    held = [np.isclose(at, of, rtol=0.0, atol=AT_AN_END).any() for at, of in zip(hypothesis.point, ends, strict=True)]
-    return np.array(held, dtype=np.bool_)
+def _free(fitted: Fitted) -> Mask:
+    """(t + numbers,): whether a number is not at one of its bounds; the model's parameters always count."""
+    point, ends = fitted.hypothesis.point, [number.bounds for number in fitted.hypothesis.numbers]
+    away = [not np.isclose(at, of, rtol=0.0, atol=AT_AN_END).any() for at, of in zip(point, ends, strict=True)]
+    return np.array([True] * len(fitted.deviations) + away, dtype=np.bool_)
 
 
-def _scores(measure: ErrorMeasure, known: Sensitivity, errors: FloatArray) -> FloatArray:
-    """(t + numbers, clusters): score of each number (column times residual), summed per cluster."""
+def _scores(measure: ErrorMeasure, known: Sensitivity, errors: FloatArray, folded: bool) -> FloatArray:
+    """(t + numbers, clusters): score of each number (column times residual), summed per cluster. folded: as below."""
     sums: list[FloatArray] = []
     first = 0
     for record in measure.records:
-        width, clusters = record.measured.shape[1], _clusters(record)[record.fit]
+        width, clusters = record.measured.shape[1], _clusters(record, folded)[record.fit]
         by_cluster = np.zeros((int(clusters.max(initial=-1)) + 1, len(known.columns)))
         edges = [0, *(np.flatnonzero(np.diff(clusters)) + 1).tolist(), len(clusters)]
         for begin, end in pairwise(edges):
@@ -194,11 +208,12 @@ def _scores(measure: ErrorMeasure, known: Sensitivity, errors: FloatArray) -> Fl
     return np.concatenate(sums).T
 
 
-def _clusters(record: Observed) -> Places:
-    """(n,): number of the cluster of each sample: stretches of `STRETCH_S`, the same of all periods of a segment."""
+def _clusters(record: Observed, folded: bool) -> Places:
+    """(n,): number of the cluster of each sample: stretches of `STRETCH_S`. folded: the same stretch of all periods of
+    a segment is one cluster."""
     width = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
     place = np.arange(len(record.fit))
-    for periods in settled_periods(record.recording):
+    for periods in settled_periods(record.recording) if folded else ():
         inside = slice(periods.segment.start, min(periods.segment.stop, len(place)))
         place[inside] = periods.segment.start + (place[inside] - periods.segment.start) % periods.length
     return np.asarray(np.unique(place // width, return_inverse=True)[1])

@@ -43,7 +43,7 @@ LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """Sensitivity of the prediction to the model's own parameters, on the samples to fit."""
+    """Sensitivity of the prediction to the model's own parameters, or to all numbers, on the samples to fit."""
 
     at: FloatArray
     """(t,): deviations (standard deviations of the calibration) at which it was computed."""

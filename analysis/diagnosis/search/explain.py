@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, gather_evidence
+from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, gather_evidence
 from analysis.diagnosis.search.compare_candidates import compare_candidates, refine
 from analysis.diagnosis.search.no_prediction import predicts_nothing
 from analysis.diagnosis.search.parsimony import excludes, plainest_first
@@ -99,8 +99,8 @@ class Explanation:
     """Effects that were found, and are not named: the recordings leave their numbers open."""
     errors: tuple[Fitted, FloatArray] | None = None
     """A fit, and the standard errors of all its numbers, where they were computed already; as `final_errors`."""
-    known: tuple[Fitted, Sensitivity] | None = None
-    """A fit at its minimum, and the sensitivity to all its numbers."""
+    between: tuple[Fitted, FloatArray | None] | None = None
+    """A fit at its minimum, and what its numbers vary between segments (`segment_errors`)."""
 
     @property
     def plain(self) -> FittedCandidate:

@@ -52,50 +52,48 @@ def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
     last = found.steps[-1] if found.steps else found.retuned
     if found.errors is not None and found.errors[0] is last.fitted:
         return found.errors[1]
-    return standard_errors(context.measure, *_with_sensitivity(context, found))
+    return standard_errors(context.measure, *_with_sensitivity(context, last.fitted))
 
 
 def interval_errors(context: SearchContext, found: Explanation, noise: FloatArray) -> FloatArray:
     """(t + numbers,): standard errors for the intervals that are stated. noise: `final_errors`, or their profiles. To
     these comes what varies between segments, up to a few times the noise's: with few segments a jackknife has heavy
     tails. A single segment tells nothing of that, and a factor stands for it."""
-    between = segment_errors(context.measure, *_with_sensitivity(context, found))
+    last = (found.steps[-1] if found.steps else found.retuned).fitted
+    if found.between is not None and found.between[0] is last:
+        between = found.between[1]
+    else:
+        between = segment_errors(context.measure, *_with_sensitivity(context, last))
     if between is None:
         return INTERVAL_FACTOR * noise
     return np.asarray(np.hypot(noise, np.minimum(between, MOST_BETWEEN_SEGMENTS * noise)))
 
 
 def finish(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """The explanation with its final fit at the minimum, and with the sensitivity there."""
-    if not found.steps or found.statistic is not None:
-        return found
+    """The explanation with its final fit at the minimum, and with its standard errors."""
     last = found.steps[-1]
+    if found.between is not None and found.between[0] is last.fitted:
+        return found
     fitted, known = _finish(context, last.fitted, time_left)
+    errors = standard_errors(context.measure, fitted, known)
+    between = segment_errors(context.measure, fitted, known)
+    found = replace(found, errors=(fitted, errors), between=(fitted, between))
     if fitted is last.fitted:
-        return replace(found, known=(fitted, known))
+        return found
     done = context.candidate(fitted)
     rounds = tuple(tuple(done if each is last else each for each in tried) for tried in found.rounds)
-    return replace(
-        found,
-        after=context.with_test_score(done),
-        rounds=rounds,
-        steps=(*found.steps[:-1], done),
-        known=(fitted, known),
-    )
+    return replace(found, after=context.with_test_score(done), rounds=rounds, steps=(*found.steps[:-1], done))
 
 
 def _finish(context: SearchContext, fitted: Fitted, time_left: TimeBudget) -> tuple[Fitted, Sensitivity]:
-    def of(at: Fitted) -> Sensitivity:
+    def sensitivity_of(at: Fitted) -> Sensitivity:
         return _sensitivity_of(context, at)
 
-    return finish_fit(context.measure, context.tuning, fitted, of, time_left)
+    return finish_fit(context.measure, context.tuning, fitted, sensitivity_of, time_left)
 
 
-def _with_sensitivity(context: SearchContext, found: Explanation) -> tuple[Fitted, Sensitivity]:
-    """The final fit on the samples to fit and to choose by, with the sensitivity to all its numbers."""
-    last = (found.steps[-1] if found.steps else found.retuned).fitted
-    if found.known is not None and found.known[0] is last:
-        return found.known
+def _with_sensitivity(context: SearchContext, last: Fitted) -> tuple[Fitted, Sensitivity]:
+    """The fit on the samples to fit and to choose by, with the sensitivity to all its numbers."""
     fitted = evaluate_fit(context.measure, context.tuning, last.deviations, last.hypothesis)
     return fitted, _sensitivity_of(context, fitted)
 
@@ -114,7 +112,7 @@ def keep_identifiable(context: SearchContext, found: Explanation, time_left: Tim
     if not found.steps:
         return found
     found = _with_profile_errors(context, found, time_left)
-    left_open = [number for number, is_open in enumerate(_open_effects(context, found)) if is_open]
+    left_open = [number for number, left in enumerate(_open_effects(context, found)) if left]
     if not left_open:
         return found
     worst = left_open[-1]
@@ -154,9 +152,11 @@ def _without_effects(found: Explanation) -> Explanation:
 
 
 def _with_profile_errors(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """The explanation with the standard errors of the final fit. Where the linearised interval of an effect's only
-    number includes no effect but its profile does not, the error is the profile's. The profile of an effect before the
-    last refits those after it, which is left out where no time is left."""
+    """The explanation with its final fit at the minimum and the standard errors there. Where the linearised interval of
+    an effect's only number includes no effect but its profile does not, the error is the profile's. The profile of an
+    effect before the last refits those after it, which is left out where no time is left."""
+    if found.statistic is None:
+        found = finish(context, found, time_left)
     errors = final_errors(context, found).copy()
     first = len(context.tuning.names)
     for effect, own in enumerate(_numbers_with_none(found, errors[first:])):
@@ -167,7 +167,7 @@ def _with_profile_errors(context: SearchContext, found: Explanation, time_left: 
         reach, away = _reach(number, at, error)
         if not away < reach <= UNDETERMINED_REACH * away:
             continue
-        sure = distance_from_none(context, found, effect)
+        sure = distance_from_none(context, found, effect, time_left)
         if sure > 1:
             share = away / (sure * reach)
             by_factor = number.parameter.scale == "log"
@@ -206,7 +206,9 @@ def _reach(number: Number, at: float, error: float) -> tuple[float, float]:
     return 1.96 * INTERVAL_FACTOR * abs(number.value(at + error) - value), abs(value - none)
 
 
-def distance_from_none(context: SearchContext, found: Explanation, effect: int) -> float:
+def distance_from_none(
+    context: SearchContext, found: Explanation, effect: int, time_left: TimeBudget = always
+) -> float:
     """Distance of an effect's only number from no effect, in half widths of its profile interval; above 1, the interval
     excludes no effect. effect: its place."""
     with_it = found.steps[-1].fitted
@@ -214,7 +216,7 @@ def distance_from_none(context: SearchContext, found: Explanation, effect: int) 
     # The re-tuned model is kept as it is on all samples. Both fits end at their minimum: else the difference is not all
     # the effect's.
     start = evaluate_fit(context.measure, context.tuning, fewer.fitted.deviations, fewer.fitted.hypothesis)
-    without = _finish(context, start, always)[0]
+    without = _finish(context, start, time_left)[0]
     gained = np.concatenate([
         _stretches(context.measure, without) - _stretches(context.measure, with_it),
         # The calibration is an observation of its own.

@@ -29,7 +29,7 @@ from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
-from analysis.diagnosis.search.identifiability import finish, keep_identifiable
+from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
 from analysis.diagnosis.search.revise_selection import exchange_effects, without_effect
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, shows_there_alone
@@ -58,9 +58,7 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
         found = _drop_former(context, found, time_left)
     if context.references is None:
         found = _drop_negligible(context, found)
-    found = finish(context, found, time_left)
-    kept = keep_identifiable(context, found, time_left)
-    return kept if kept.steps is found.steps else finish(context, kept, time_left)
+    return keep_identifiable(context, found, time_left)
 
 
 def _drop_former(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
