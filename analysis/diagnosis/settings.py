@@ -161,7 +161,7 @@ ELSEWHERE_HALFWAY, ELSEWHERE_STEEPNESS = 0.35, 1.5  # error above noise at which
 # What is said and proposed (`wording`, `unit_doubt`, `next_experiment`). By hand.
 SAME_TO_READERS = 1.05  # ratio of errors that count as the same
 FIT_CONFIRMED = 1.25  # held-out error over the error on what was fitted
-UNIT_FACTOR, UNIT_CORRELATION = 5.0, 0.9  # factor from which a unit is doubted, where courses correlate so well
+UNIT_FACTOR, UNIT_CORRELATION = 5.0, 0.9  # factor from which a unit is doubted, where the signals correlate so well
 TELLING_GAIN = 10.0  # log likelihood below which a proposed recording would leave rivals as good as each other
 
 # A law without a name (`discovery`). By hand, but where a principle is named.

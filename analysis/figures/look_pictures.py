@@ -81,7 +81,7 @@ def envelope(samples: FloatArray, rate_hz: float, columns: int = COLUMNS) -> tup
     starts = np.unique(np.linspace(0, len(samples), min(columns, len(samples)), endpoint=False).astype(int))
     low = np.fmin.reduceat(samples, starts)
     high = np.fmax.reduceat(samples, starts)
-    # Neighbouring columns touch, or a steep course would fall into pieces.
+    # Neighbouring columns touch, or a steep curve would fall into pieces.
     low[1:], high[1:] = np.fmin(low[1:], high[:-1]), np.fmax(high[1:], low[:-1])
     return starts / rate_hz, low, high
 

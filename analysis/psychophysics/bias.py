@@ -1,7 +1,7 @@
 """Sensitivity and response bias of one-interval, two-alternative identification.
 
 The task shows one of two directions per trial, so an unbiased observer's proportion correct is Phi(d' / 2): the
-79.4 % of a 1-up 3-down staircase is d' = 1.64, not the 1.16 of a two-interval task. A liking for one answer lowers
+79.4 % of a 1-up 3-down staircase is d' = 1.64, not the 1.16 of a two-interval task. A bias towards one answer lowers
 the proportion correct at equal d' and so raises a staircase threshold: at d' = 1.64 a criterion of 0.5 leaves 76.6 %
 and one of 1.0 leaves 69.7 %.
 

@@ -17,8 +17,8 @@ from protocols.trial import Trial, TrialStatus
 FEW_PARTICIPANTS = 5
 """Number of participants below which means and their comparison say little about people in general."""
 STRONG_BIAS = 0.6
-"""Criterion beyond which a liking for one answer costs a staircase four in a hundred right answers. An observer
-without any exceeds it by chance in about one of 250 runs."""
+"""Criterion beyond which response bias costs a staircase four in a hundred right answers. An observer
+without bias exceeds it by chance in about one of 250 runs."""
 
 MANY_LAPSES = 0.1
 """Lapse rate on catch trials that is worth a look; the published staircase is meant for attentive people."""
@@ -171,7 +171,7 @@ def _bias_warning(rows: Sequence[Threshold]) -> str:
     ]
     if not leaning:
         return ""
-    return f"A liking for one of the two answers, which raises a threshold, shows in {conjoin(leaning)}."
+    return f"A bias towards one of the two answers, which raises a threshold, shows in {conjoin(leaning)}."
 
 
 def _spoiled_warning(trials: Iterable[Trial]) -> str:

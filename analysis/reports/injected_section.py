@@ -22,7 +22,7 @@ def injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
         outcome for outcome in outcomes if not outcome.right and (outcome.detectable or outcome.judged == "wrong")
     ]
     listed = Table(
-        "Every miss, and every wrong story",
+        "Every miss, and every wrong fault named",
         ("recording", "injected", "error changes by", "judged", "named"),
         tuple(
             (

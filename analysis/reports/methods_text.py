@@ -41,7 +41,7 @@ _STATISTICS = (
 
 _SENSITIVITY = (
     "Sensitivity d' and criterion are those of one-interval identification over all trials of a run, with the "
-    "log-linear correction; the criterion is positive for a liking of the answer 2."
+    "log-linear correction; the criterion is positive for a bias towards the answer 2."
 )
 
 

@@ -19,9 +19,9 @@ AT_BOUND = 0.01
 """Of the logarithm of a spread."""
 MEANING = (
     "One psychometric model of all answers: thresholds differ by frequency, by person, and by person at each "
-    "frequency; slopes and likings for one answer differ by person. An answer at the cap is an answer like any other, "
+    "frequency; slopes and response biases differ by person. An answer at the cap is an answer like any other, "
     "so nothing is censored and no participant is left out; levels that follow the answers do not bias the "
-    "likelihood. Threshold: the level at which an attentive answer without a liking for one direction is right in "
+    "likelihood. Threshold: the level at which an attentive answer without a bias towards one direction is right in "
     "79.37 %."
 )
 
@@ -31,7 +31,7 @@ RUN_MEANING = (
 )
 SINGLE_MEANING = (
     "From the answers at this frequency alone. What a run does not tell is averaged over usual people: slopes within a "
-    "factor of 1.5, likings for one answer within 0.3 d', few lapses. Above the cap, or below the levels played (right "
+    "factor of 1.5, response biases within 0.3 d', few lapses. Above the cap, or below the levels played (right "
     "answers only): no size, a one-sided bound."
 )
 TOBIT_MEANING = (
@@ -90,8 +90,8 @@ def _overall(primary: PrimaryAnalysis) -> str:
     return (
         f"{test}People differ by {number(primary.person_sd_db, 1)} dB (standard deviation) at all frequencies, and by "
         f"{number(primary.frequency_sd_db, 1)} dB more from frequency to frequency. Median slope "
-        f"{number(primary.slope)} ({primary.family.value}), lapse rate {number(100 * primary.lapse, 1)} %, likings for "
-        f"one answer {number(primary.criterion_sd)} (standard deviation, in units of d')."
+        f"{number(primary.slope)} ({primary.family.value}), lapse rate {number(100 * primary.lapse, 1)} %, response "
+        f"bias {number(primary.criterion_sd)} (standard deviation, in units of d')."
         + ("" if primary.converged else " The search ended before it had settled: do not use these numbers.")
         + undetermined_words(primary)
     )

@@ -109,7 +109,7 @@ class ScheduleSettings:
         Literal["fixed", "swapped_for_half"],
         Field(
             description="Whether the numbers 1 and 2 change places for every second participant. Default: "
-            "fixed, as published; swapping separates a liking for a key from a direction."
+            "fixed, as published; swapping separates a bias towards a key from one towards a direction."
         ),
     ] = "fixed"
 

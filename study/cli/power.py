@@ -39,7 +39,7 @@ PeopleOption = Annotated[
     str,
     typer.Option(
         help="attentive; some-guess (one in ten guesses); repeating (all ask again when unsure, as often as the "
-        "protocol allows); criterion-drift (the liking for one answer drifts)."
+        "protocol allows); criterion-drift (the response bias drifts)."
     ),
 ]
 

@@ -20,7 +20,7 @@ import numpy as np
 from study.devices.clock import RealClock
 from study.devices.device import Health
 from study.devices.drive.stepped_runner import SteppedRunner
-from study.devices.force_dimension.tick_io import LIBRARY
+from study.devices.force_dimension.loop_cells import LIBRARY
 from study.devices.governor import cells
 from study.devices.governor.governor import Governor
 from study.devices.safe import SafeDevice

@@ -13,7 +13,7 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.measured_motion import is_quasi_static, is_read_as_free
 from analysis.diagnosis.data.observed_parts import observed_parts
-from analysis.diagnosis.errors.choose_measure import Chosen, Compared, measure_by_force, measure_of
+from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, measure_by_force, measure_of
 from analysis.diagnosis.errors.fit_score import fit_score
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
@@ -37,7 +37,7 @@ class FittingMeasure:
     """A model, and the error measure of its fit."""
 
     model: MechanicalModel
-    chosen: Chosen
+    chosen: MeasureChoice
     narrow: bool = False
     """Whether the band is limited to small noise in the force, which may leave parameters of laws undetermined."""
 
@@ -82,7 +82,7 @@ def _about_mean_force(
     return add_to_commands(recordings, -np.mean(missed, axis=0) * measure.unit)
 
 
-def _error_over_noise(model: MechanicalModel, chosen: Chosen) -> float:
+def _error_over_noise(model: MechanicalModel, chosen: MeasureChoice) -> float:
     """Error of the unchanged model over the noise, on the samples to fit and to choose by."""
     measure = chosen.measure
     tuning = tuning_of(model, measure.records[0].recording.command.channels)

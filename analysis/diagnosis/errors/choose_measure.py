@@ -44,7 +44,7 @@ NO_STATE = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chosen:
+class MeasureChoice:
     """The chosen error measure with the noise of its signals, and remarks for the user."""
 
     measure: ErrorMeasure
@@ -58,7 +58,7 @@ def measure_of(
     model: MechanicalModel,
     beside: Sequence[Recording] = (),
     compared: Compared = "auto",
-) -> Chosen:
+) -> MeasureChoice:
     """The error measure that the rule selects, of every part of the recordings. beside: other recordings that must be
     measured the same way, and are not part of it."""
     if compared == "force":
@@ -76,22 +76,24 @@ def measure_of(
     known = place_recorded_effects(model, recordings[0])
     remarks = (*((choice.why,) if choice.why else ()), *_of_known(known))
     if choice.measure == "free simulation":
-        return Chosen(FreeSimulation(records, unit, noise, known=known), floors, remarks)
+        return MeasureChoice(FreeSimulation(records, unit, noise, known=known), floors, remarks)
     if choice.measure == "windows":
         # Imported here, as in `_by_force`: most diagnoses compare a free simulation.
         from analysis.diagnosis.errors.windows import windows_of
 
         try:
             windows = replace(windows_of(records, model, (unit, noise)), known=known)
-            return Chosen(windows, floors, remarks)
+            return MeasureChoice(windows, floors, remarks)
         except np.linalg.LinAlgError:
             if compared == "motion" or not all(has_motion(record.recording, model) for record in records):
-                return Chosen(FreeSimulation(records, unit, noise, known=known), floors, (NO_STATE, *_of_known(known)))
+                return MeasureChoice(
+                    FreeSimulation(records, unit, noise, known=known), floors, (NO_STATE, *_of_known(known))
+                )
     band_hz = ORDERED * recordings[0].sample_rate_hz if choice.why == UNTIMED else None
     return _by_force(records, model, floors, remarks, band_hz)
 
 
-def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> Chosen:
+def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> MeasureChoice:
     """The error measure by force, up to a frequency, without the rule; see `has_motion`."""
     records = observed_parts(recordings, model.outputs)
     known = place_recorded_effects(model, recordings[0])
@@ -105,13 +107,13 @@ def _by_force(
     floors: Sequence[NoiseFloor],
     remarks: tuple[str, ...],
     band_hz: float | None = None,
-) -> Chosen:
+) -> MeasureChoice:
     from analysis.diagnosis.forces.force_views import force_views
 
     known = place_recorded_effects(model, records[0].recording)
     views = force_views(records, model, floors, band_hz)
     text = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
-    return Chosen(replace(views.measure, known=known), views.floors, tuple(filter(None, (*remarks, text))))
+    return MeasureChoice(replace(views.measure, known=known), views.floors, tuple(filter(None, (*remarks, text))))
 
 
 def _of_known(known: Sequence[PlacedEffect]) -> tuple[str, ...]:

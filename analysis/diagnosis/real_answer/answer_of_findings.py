@@ -129,8 +129,8 @@ def drawn_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:
     begin = max(min(first + at - DRAWN // 2, last - DRAWN), first)
     part = slice(begin, min(begin + DRAWN, last))
     measured, retuned, after = (
-        tuple(np.nan_to_num(course_of[part, c]).tolist())
-        for course_of in (series.measured, series.retuned, series.after)
+        tuple(np.nan_to_num(values_of[part, c]).tolist())
+        for values_of in (series.measured, series.retuned, series.after)
     )
     step_s = 1 / series.sample_rate_hz
     return DrawnExcerpt(

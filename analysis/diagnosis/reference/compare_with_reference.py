@@ -11,7 +11,7 @@ from analysis.diagnosis.contrast.comparison import Comparison
 from analysis.diagnosis.contrast.decide import Decision, decide
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.signal_faults import SignalFault, find_hum, find_quantization, find_sensor_noise
-from analysis.diagnosis.errors.choose_measure import Chosen
+from analysis.diagnosis.errors.choose_measure import MeasureChoice
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.prediction_error import prediction_error
 from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
@@ -110,7 +110,7 @@ def predicts_clean(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
     return all(error is not None and error <= FORESEEN for error in errors)
 
 
-def noise_is_from_repeats(chosen: Chosen) -> bool:
+def noise_is_from_repeats(chosen: MeasureChoice) -> bool:
     """Whether a free simulation is compared, and its noise is known from what repeats."""
     size = np.nanstd(np.vstack([record.measured for record in chosen.measure.records]), axis=0)
     repeats = all(floor.how == "repeats" for floor in chosen.floors)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.choose_measure import Chosen, measure_of
+from analysis.diagnosis.errors.choose_measure import MeasureChoice, measure_of
 from analysis.diagnosis.errors.coloured_measure import (
     ColouredMeasure,
     WhiteningFilter,
@@ -139,7 +139,7 @@ def _rms(residuals: Sequence[FloatArray]) -> FloatArray:
     return np.asarray(np.sqrt(np.nanmean(np.vstack(residuals) ** 2, axis=0)))
 
 
-def _learn_from_recording(chosen: Chosen, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:
+def _learn_from_recording(chosen: MeasureChoice, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:
     whole, tuning = chosen.measure, tuning_of(model, recording.command.channels)
     context = SearchContext(whole.shorten(), whole, tuning, map_)
     retuned = context.with_test_score(context.candidate(retune_alone(context)))

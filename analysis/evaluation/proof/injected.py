@@ -95,9 +95,9 @@ def injected_figures(outcomes: Sequence[InjectedOutcome]) -> tuple[Figure, ...]:
         share("nothing injected, nothing named", nothing, lambda each: each.right),
         share("detectable faults named, or in the class", faults, lambda each: each.right),
         share("detectable faults, another name at the right place", faults, _is_judged("other name, right place")),
-        share("detectable faults, a wrong story", faults, _is_judged("wrong")),
+        share("detectable faults, a wrong fault named", faults, _is_judged("wrong")),
         share("too weak to ask for, named all the same", weak, lambda each: each.right),
-        share("too weak to ask for, a wrong story", weak, _is_judged("wrong")),
+        share("too weak to ask for, a wrong fault named", weak, _is_judged("wrong")),
     )
 
 

@@ -10,8 +10,9 @@ ALIKE = 1.25
 """Largest ratio of couplings that count as nearly the same."""
 
 _DIFFERS = (
-    "The simulated device's mount was given its modes so that the coupling follows the published course: alike up to "
-    "15 Hz, most at 25 Hz, less at 35 Hz. That it does shows that the simulation is set up as intended, nothing more.",
+    "The simulated device's mount was given its modes so that the coupling follows the published one over frequency: "
+    "alike up to 15 Hz, most at 25 Hz, less at 35 Hz. That it does shows that the simulation is set up as intended, "
+    "nothing more.",
     "The paper scales each ellipse to itself and prints no number; neither the force nor whether a person held the "
     "handle is said. Here: the amplitude of the protocol, and a spring instead of a hand.",
     "The published definition, mean squares, counts noise and harmonics as motion. The same picture from the driven "

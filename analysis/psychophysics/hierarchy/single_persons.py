@@ -1,8 +1,8 @@
 """Thresholds of persons who cannot be compared with others: one participant alone, or people at a single frequency.
 
 No estimate is drawn towards another person's. What a run of some 60 trials does not tell comes from fixed priors in
-place of a population's: the slope is that of usual people within a factor of 1.5, the liking for one answer within 0.3
-d', the lapse rate as in `objective.Prior`. Then each run has the profile interval of `run_likelihood`.
+place of a population's: the slope is that of usual people within a factor of 1.5, the response bias within
+0.3 d', the lapse rate as in `objective.Prior`. Then each run has the profile interval of `run_likelihood`.
 """
 
 import math

@@ -19,7 +19,7 @@ from study.tui.session_status import STYLES, status_text
 _NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = (
     "Session",
     "Standing",
-    "SessionParticipant",
+    "Begun",
     "Runs",
     "Answers",
     "Protocol",

@@ -76,9 +76,9 @@ def test_a_response_bias_is_named(able, protocol):
         replace(trial, direction_shown=1 if trial.correct else 2, answer=1) if trial.run == 1 else trial
         for trial in able
     ]
-    (liking,) = warnings(leaning, protocol)
-    assert liking.startswith("A liking for one of the two answers, which raises a threshold, shows in s01 at ")
-    assert "(criterion −" in liking
+    (bias,) = warnings(leaning, protocol)
+    assert bias.startswith("A bias towards one of the two answers, which raises a threshold, shows in s01 at ")
+    assert "(criterion −" in bias
 
 
 def test_spoiled_flagged_and_unmeasured_trials_are_counted(able, protocol):

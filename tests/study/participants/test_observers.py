@@ -72,7 +72,7 @@ def test_the_lapsing_observer_stays_below_certainty_where_the_ideal_one_is_certa
 
 
 @pytest.mark.parametrize(("criterion", "expected"), [(0.0, 0.7937), (0.25, 0.786), (0.5, 0.766), (1.0, 0.697)])
-def test_a_liking_for_one_answer_lowers_the_share_of_right_ones_as_detection_theory_says(criterion, expected):
+def test_a_bias_to_one_answer_lowers_the_share_of_right_ones_as_detection_theory_says(criterion, expected):
     biased = DirectionFeeler("biased", TYPICAL_THRESHOLDS_N, criterion=criterion)
     both = [biased.share_right(replace(FELT, direction_shown=direction)) for direction in (1, 2)]
     assert np.mean(both) == pytest.approx(expected, abs=0.0006)
@@ -175,7 +175,7 @@ def test_who_feels_nothing_finds_no_interval(name):
     assert share_right(find_observer(name, 1), detection(15.0, 3.0)) == pytest.approx(0.5, abs=FOUR_ERRORS)
 
 
-def test_lapses_and_a_liking_for_1_show_in_detection_trials_too():
+def test_lapses_and_a_bias_to_1_show_in_detection_trials_too():
     assert share_right(find_observer("lapsing", 0), detection(15.0, 3.0)) == pytest.approx(0.95, abs=FOUR_ERRORS)
     liked = share_of_1(find_observer("biased", 0), detection(15.0, 0.005))
     assert liked == pytest.approx(0.69, abs=FOUR_ERRORS + 0.005)

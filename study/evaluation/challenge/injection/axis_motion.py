@@ -100,6 +100,6 @@ def _differentiate(samples: FloatArray, order: int, rate_hz: float) -> tuple[Flo
         gain = turn**times / (1 + (frequency / cut) ** 8)
         if times < 0:
             gain = np.where(frequency < 4 * rate_hz / len(filled), 0.0, gain)
-        course = np.fft.irfft(gain * spectrum, len(whole))[: len(filled)]
-        found.append(course + (line if times == 0 else slope if times == 1 else 0.0))
+        motion = np.fft.irfft(gain * spectrum, len(whole))[: len(filled)]
+        found.append(motion + (line if times == 0 else slope if times == 1 else 0.0))
     return found[0], found[1], found[2]

@@ -154,7 +154,7 @@ def test_no_clock_rate_is_suggested_for_a_clock_in_order(period):
 def test_parts_that_are_hardly_longer_than_the_filter_suggest_nothing(rows):
     """Their blocks were empty, and their times no numbers."""
     (compared,) = streams_beside([oscillator(2, 40)[0]])
-    short = replace(compared, other=replace(compared.faulty, rows=tuple(part[:rows] for part in compared.faulty.rows)))
+    short = replace(compared, faulty=replace(compared.faulty, rows=tuple(part[:rows] for part in compared.faulty.rows)))
     assert likely_clock_rates([short]) == () and likely_delays_s([short]) == ()
 
 

@@ -50,7 +50,7 @@ def test_points_lie_within_their_bins_and_their_intervals(study):
         assert abs(point.level_db - BIN_DB * round(point.level_db / BIN_DB)) <= BIN_DB / 2
 
 
-def test_without_lapse_and_liking_the_curve_is_weibulls_and_meets_its_target_at_the_threshold():
+def test_without_lapse_and_bias_the_curve_is_weibulls_and_meets_its_target_at_the_threshold():
     above_db = np.array([-30.0, -6.0, 0.0, 3.0, 12.0])
     scale = (-np.log(2 - 2 * TARGET)) ** -0.5  # of a Weibull curve of slope 2 whose target lies at 1 N
     expected = 1 - 0.5 * np.exp(-((10 ** (above_db / 20) / scale) ** 2))
@@ -58,7 +58,7 @@ def test_without_lapse_and_liking_the_curve_is_weibulls_and_meets_its_target_at_
     assert expected[2] == pytest.approx(TARGET)
 
 
-def test_a_liking_for_one_answer_lowers_the_curve():
+def test_a_bias_to_one_answer_lowers_the_curve():
     assert person_curve(np.zeros(1), person(criterion=0.5), Fitted(person()))[0] < TARGET - 0.02
 
 
