@@ -21,8 +21,8 @@ from analysis.psychophysics.hierarchy.refine import Refinement
 from equalizer.signals.signal import FloatArray
 
 BOUND_ROOT, BOUND_STEPS = 0.03, 8
-"""A bound is found when its likelihood root, some 1.8, is met this closely: 95 % is then 94.8 to 95.2 %. The steps end
-a search on a likelihood that is no line at all, on the safe side."""
+"""A bound is found when its likelihood root, some 2.3, is met this closely: 97.5 % is then 97.4 to 97.6 %. The steps
+end a search on a likelihood that is no line at all, on the safe side."""
 FAR_DB = 32.0
 """Farthest search for a bound below the estimate, in dB."""
 
@@ -81,15 +81,16 @@ def pseudo_thresholds(fit: HierarchicalFit) -> FloatArray:
 def median_thresholds(
     fit: HierarchicalFit, cap_db: float, confidence: float, prior: Prior | None = None
 ) -> tuple[MedianThreshold, ...]:
-    """Two-sided intervals below the cap, one-sided profile bounds above it. With two people there is no interval: a t
-    distribution with one degree of freedom holds nearly every threshold."""
+    """Two-sided intervals below the cap, one-sided profile bounds above it, each the lower end that a two-sided
+    interval of the confidence has: the data choose which of them is told (see `lower_bound`). With two people there is
+    no interval: a t distribution with one degree of freedom holds nearly every threshold."""
     pseudo, n = pseudo_thresholds(fit), fit.answers.persons
     half = student.ppf(0.5 + confidence / 2, n - 1) * pseudo.std(axis=0, ddof=1) / math.sqrt(n)
     medians = []
     for place, frequency_hz in enumerate(fit.answers.frequencies_hz):
         db = float(fit.means_db[place])
         if db > cap_db:
-            bound = lower_bound(fit, place, confidence, prior or Prior())
+            bound = lower_bound(fit, place, 0.5 + confidence / 2, prior or Prior())
             medians.append(MedianThreshold(frequency_hz, db, bound, None, True))
         elif n < FEWEST_PEOPLE:
             medians.append(MedianThreshold(frequency_hz, db, None, None, False))
@@ -100,6 +101,10 @@ def median_thresholds(
 
 def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prior) -> float | None:
     """One-sided bound of a mean by profile likelihood, with the t distribution's quantile in place of the normal's.
+
+    A bound that is only told where the estimate is above the cap is wrong more often than its confidence says, where
+    the true median is near the cap: then each of the two ends may be wrong by half of what is left, and no more.
+    Source: G. J. Feldman, R. D. Cousins, Phys. Rev. D 57 (1998), 3873-3889.
 
     None where no bound is found within `FAR_DB` below the estimate.
     """

@@ -5,7 +5,9 @@ answers, or are averaged over a distribution of each (`Nuisance`). The threshold
 anything, and so is the interval.
 
 A run with only right answers has no most probable threshold: the lower, the more probable. It gets no size and only an
-upper bound, as a run whose most probable threshold is above the cap gets only a lower one.
+upper bound, as a run whose most probable threshold is above the cap gets only a lower one. A bound is the end that the
+two-sided interval has: the answers choose which of them is told, and a bound of the confidence itself would then be
+wrong more often than it says (G. J. Feldman, R. D. Cousins, Phys. Rev. D 57 (1998), 3873-3889).
 
 Source: S. S. Wilks, Ann. Math. Stat. 9 (1938), 60-62 (half the chi-squared quantile below the highest log-likelihood).
 """
@@ -16,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
@@ -116,8 +118,7 @@ def _profile_interval(
     """Most probable threshold, lower and upper end, and whether it lies below the grid."""
     best = float(grid[height.argmax()])
     below, above = bool(height[0] >= height.max() - SAME_HEIGHT), best > cap_db
-    drop = norm.ppf(confidence) ** 2 / 2 if above or below else chi2.ppf(confidence, 1) / 2
-    inside = np.flatnonzero(height >= height.max() - drop)
+    inside = np.flatnonzero(height >= height.max() - chi2.ppf(confidence, 1) / 2)
     lower = float(grid[inside[0]]) if inside[0] > 0 else None
     upper = float(grid[inside[-1]]) if inside[-1] < len(grid) - 1 else None
     if below:

@@ -63,11 +63,12 @@ def test_right_answers_alone_give_an_upper_bound_and_no_size(family, slope):
 
 
 def test_an_upper_bound_after_right_answers_alone_excludes_what_it_should():
-    """At the bound, so many right answers have the probability exp(-1.35) of the highest possible: one-sided 95 %."""
+    """At the bound, so many right answers have the probability exp(-1.92) of the highest possible: the end that a
+    two-sided interval of 95 % has."""
     run = one_run(np.full(10, 0.5), np.ones(10, dtype=bool))
     t = np.log(-np.log(2 - 2 * 0.5 ** (1 / 3))) + 2.0 * np.log(0.5 / newton_or_none(run.upper_db))
     share = 0.02 + 0.96 * (1.0 - 0.5 * np.exp(-np.exp(t)))
-    assert 10 * np.log(share / 0.98) == pytest.approx(-(1.645**2) / 2, abs=0.1)  # the criterion of 0.1 left out here
+    assert 10 * np.log(share / 0.98) == pytest.approx(-(1.96**2) / 2, abs=0.1)  # the criterion of 0.1 left out here
 
 
 def test_one_right_answer_bounds_nothing_and_a_wrong_one_ends_the_case():
