@@ -101,7 +101,7 @@ def undetermined_words(primary: PrimaryAnalysis) -> str:
     """A sentence with a space before it where a spread between people ended at the bound of its search; else nothing.
     It happens with few people, whose answers hold a slope of 2 and one of 20 nearly equally probable."""
     found = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
-    names = ("thresholds", "thresholds from frequency to frequency", "slopes", "likings for one answer")
+    names = ("thresholds", "thresholds from frequency to frequency", "slopes", "response biases")
     at_bound = [
         name
         for name, spread, (_, highest) in zip(names, found, LOG_SD_BOUNDS, strict=True)

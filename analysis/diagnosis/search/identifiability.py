@@ -74,15 +74,20 @@ def finish(context: SearchContext, found: Explanation, time_left: TimeBudget) ->
     last = found.steps[-1]
     if found.between is not None and found.between[0] is last.fitted:
         return found
-    fitted, known = _finish(context, last.fitted, time_left)
+    # The last step may have been scored on all samples, held-out ones included.
+    start = evaluate_fit(context.measure, context.tuning, last.fitted.deviations, last.fitted.hypothesis)
+    fitted, known = _finish(context, start, time_left)
     errors = standard_errors(context.measure, fitted, known)
     between = segment_errors(context.measure, fitted, known)
-    found = replace(found, errors=(fitted, errors), between=(fitted, between))
-    if fitted is last.fitted:
-        return found
-    done = context.candidate(fitted)
+    if fitted is start:
+        return replace(found, errors=(last.fitted, errors), between=(last.fitted, between))
+    after = context.with_test_score(context.candidate(fitted))
+    done = after if last is found.after else context.candidate(fitted)
     rounds = tuple(tuple(done if each is last else each for each in tried) for tried in found.rounds)
-    return replace(found, after=context.with_test_score(done), rounds=rounds, steps=(*found.steps[:-1], done))
+    steps = (*found.steps[:-1], done)
+    return replace(
+        found, after=after, rounds=rounds, steps=steps, errors=(done.fitted, errors), between=(done.fitted, between)
+    )
 
 
 def _finish(context: SearchContext, fitted: Fitted, time_left: TimeBudget) -> tuple[Fitted, Sensitivity]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.special import expit
 
 from analysis.psychophysics.hierarchy.answers import Answers
@@ -22,6 +23,11 @@ class HierarchicalFit:
     """(k + 6,): see `marginal.Layout`."""
     latent: FloatArray
     """(n, k + 2): each person's thresholds in dB, log-slope, criterion; modes given their answers and the others."""
+    shared_means: FloatArray
+    """(n, 2): posterior means of each person's log-slope and criterion, thresholds integrated out: at the common mode
+    of all, slopes are too steep, as each threshold follows its own answers."""
+    shared_errors: FloatArray
+    """(n, 2): posterior standard deviations of these."""
     log_likelihood: float
     scores: FloatArray
     """(n, k + 6): gradient of each person's log marginal likelihood at the numbers."""
@@ -52,6 +58,8 @@ def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prio
         family=family,
         numbers=found.numbers,
         latent=objective.marginal.centres(found.numbers)[0],
+        shared_means=found.moments.shared[:, 1:],
+        shared_errors=np.sqrt(np.diagonal(found.moments.covariance, axis1=1, axis2=2)[:, 1:]),
         log_likelihood=found.log_likelihood,
         scores=found.scores,
         curvature=found.curvature,

@@ -8,7 +8,7 @@ import numpy as np
 from analysis.psychophysics.group_contrasts import Contrast, contrasts, pair_contrast
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
-from analysis.psychophysics.hierarchy.fit import fit_hierarchy
+from analysis.psychophysics.hierarchy.fit import HierarchicalFit, fit_hierarchy
 from analysis.psychophysics.hierarchy.goodness import GoodnessOfFit, goodness_of_fit
 from analysis.psychophysics.hierarchy.inference import (
     DirectionLimit,
@@ -89,8 +89,7 @@ def primary_analysis(
     fit = fit_hierarchy(answers, family)
     pseudo, cap_db, frequencies = pseudo_thresholds(fit), to_db(cap_n), answers.frequencies_hz
     numbers, k, sds = fit.numbers, fit.layout.k, np.exp(fit.numbers[fit.layout.log_sds])
-    persons = estimate_persons(answers.subjects, fit.latent, cap_db)
-    nuisances = [Nuisance(person.slope, person.criterion, (fit.lapse,)) for person in persons]
+    persons = estimate_persons(answers.subjects, np.hstack([fit.latent[:, :-2], fit.shared_means]), cap_db)
     return PrimaryAnalysis(
         family=family,
         trials=answers.trials,
@@ -101,7 +100,7 @@ def primary_analysis(
         contrasts=contrasts(frequencies, pseudo, confidence),
         limit=direction_limit(frequencies, pseudo, cap_db, confidence),
         persons=persons,
-        runs=run_likelihoods(answers, nuisances, cap_db, family, confidence),
+        runs=run_likelihoods(answers, _nuisances(fit, persons), cap_db, family, confidence),
         person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),
         slope=float(np.exp(numbers[k + 2])),
         slope_log_sd=float(sds[2]),
@@ -114,6 +113,14 @@ def primary_analysis(
     )  # fmt: skip
 
 
+def _nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[Nuisance]:
+    """What all answers of each person tell of the slope and the criterion."""
+    return [
+        Nuisance(person.slope, person.criterion, (fit.lapse,), *map(float, errors))
+        for person, errors in zip(persons, fit.shared_errors, strict=True)
+    ]
+
+
 def at_played_frequencies(answers: Answers) -> Answers:
     """The same answers without the frequencies that have none: a mean without data would have no estimate."""
     k = len(answers.frequencies_hz)
@@ -123,7 +130,8 @@ def at_played_frequencies(answers: Answers) -> Answers:
 
 
 def estimate_persons(subjects: Sequence[str], latent: FloatArray, cap_db: float) -> tuple[PersonEstimate, ...]:
-    """Thresholds, slope and criterion of each person. latent: (n, k + 2), thresholds in dB, log-slope, criterion."""
+    """Thresholds, slope and criterion of each person. latent: (n, k + 2), thresholds in dB (modes), log-slope and
+    criterion (means with the thresholds integrated out)."""
     return tuple(
         PersonEstimate(
             subject=subject,

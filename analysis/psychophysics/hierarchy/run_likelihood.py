@@ -1,8 +1,8 @@
 """Maximum-likelihood threshold of each single run, with a likelihood interval.
 
-One run of some 60 trials does not tell a slope: slope, criterion and lapse rate are the person's from the model of all
-answers, or are averaged over a distribution of each (`Nuisance`). The threshold is the run's alone, not drawn towards
-anything, and so is the interval.
+One run of some 60 trials does not tell a slope: it is averaged over a distribution of slopes, criteria and lapse rates
+(`Nuisance`): of what all answers of the person tell in the model of all answers, or of what is usual. The threshold is
+the run's alone, not drawn towards anything, and so is the interval.
 
 A run with only right answers has no most probable threshold: the lower, the more probable. It gets no size and only an
 upper bound, as a run whose most probable threshold is above the cap gets only a lower one. A bound is the end that the

@@ -11,7 +11,7 @@ from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 ANALYSIS_NAME = "analysis"
 """Default output folder, in the analysed folder."""
 
-OURS = ("thresholds", "units", "psychometric", "psychometric-*", "delivered", "ellipsoids", "staircases-*")
+OURS = ("thresholds", "medians", "units", "psychometric", "psychometric-*", "delivered", "ellipsoids", "staircases-*")
 """Name patterns of figures; earlier ones are removed, since they may show a participant who has withdrawn."""
 
 STATISTICS_NAME, PAGE_NAME = "anova.json", "report.html"
