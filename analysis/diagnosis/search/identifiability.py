@@ -81,8 +81,9 @@ def finish(context: SearchContext, found: Explanation, time_left: TimeBudget) ->
     between = segment_errors(context.measure, fitted, known)
     if fitted is start:
         return replace(found, errors=(last.fitted, errors), between=(last.fitted, between))
-    after = context.with_test_score(context.candidate(fitted))
-    done = after if last is found.after else context.candidate(fitted)
+    candidate = context.candidate(fitted)
+    after = context.with_test_score(candidate)
+    done = after if last is found.after else candidate
     rounds = tuple(tuple(done if each is last else each for each in tried) for tried in found.rounds)
     steps = (*found.steps[:-1], done)
     return replace(
@@ -117,7 +118,7 @@ def keep_identifiable(context: SearchContext, found: Explanation, time_left: Tim
     if not found.steps:
         return found
     found = _with_profile_errors(context, found, time_left)
-    left_open = [number for number, left in enumerate(_open_effects(context, found)) if left]
+    left_open = [number for number, left in enumerate(open_effects(context, found)) if left]
     if not left_open:
         return found
     worst = left_open[-1]
@@ -147,7 +148,7 @@ def _find_replacement(context: SearchContext, found: Explanation, time_left: Tim
             found, after=context.with_test_score(other), rounds=((other, *rest),), steps=(other,), errors=None
         )
         instead = _with_profile_errors(context, instead, time_left)
-        if not any(_open_effects(context, instead)):
+        if not any(open_effects(context, instead)):
             return instead
     return None
 
@@ -191,13 +192,13 @@ def _numbers_with_none(found: Explanation, errors: FloatArray) -> Iterator[list[
         yield [number for number in own if number[0].parameter.none is not None]
 
 
-def _open_effects(context: SearchContext, found: Explanation) -> Iterator[bool]:
+def open_effects(context: SearchContext, found: Explanation) -> Iterator[bool]:
     """Whether an effect is open, by effect: the intervals of all its numbers that can mean no effect include it."""
     for own in _numbers_with_none(found, number_errors(context, found)):
-        yield bool(own) and all(is_open(number, at, error) for number, _, at, error in own)
+        yield bool(own) and all(_is_open(number, at, error) for number, _, at, error in own)
 
 
-def is_open(number: Number, at: float, error: float) -> bool:
+def _is_open(number: Number, at: float, error: float) -> bool:
     """Whether the number's interval contains the value that means no effect. error: standard error of its
     coordinate `at`."""
     reach, away = _reach(number, at, error)

@@ -19,7 +19,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit, expected_gain, 
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.explain import Explanation, Statistic
-from analysis.diagnosis.search.identifiability import is_open
+from analysis.diagnosis.search.identifiability import open_effects
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import (
     IMPACTS_AS_GOOD,
@@ -165,16 +165,12 @@ def _judge(
         if candidate.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
     ]
     rivals.sort(key=lambda rival: rival.score.mean_log_error)
-    if not _is_convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals) or _is_gap_open(best):
+    if not _is_convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals):
         return None
     statistic = Statistic(WORDS, comparison.chance, best.errors)
-    return Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
-
-
-def _is_gap_open(best: BandPowerFit) -> bool:
-    """Whether the interval of the gap contains zero: then something else makes the response irregular."""
-    numbers = zip(best.hypothesis.numbers, best.hypothesis.point, best.errors, strict=True)
-    return any(number.parameter.name == "gap" and is_open(number, at, error) for number, at, error in numbers)
+    explained = Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
+    # Where the gap may be zero, something else makes the response irregular.
+    return None if any(open_effects(context, explained)) else explained
 
 
 def _comparison(context: SearchContext, best: BandPowerFit) -> _Comparison:

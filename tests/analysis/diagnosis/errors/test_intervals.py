@@ -208,22 +208,26 @@ def test_periods_of_few_stretches_do_not_make_the_intervals_narrow(period):
     assert np.mean([of_periods(seed, period, 0.0) for seed in range(DRAWS)]) >= 0.88
 
 
-def test_a_number_at_its_bound_leaves_it_and_has_an_error_then():
+@dataclass(frozen=True)
+class Jumping(StraightLine):
+    """Channel 0 answers to the jump of a dead band alone, which cannot be below zero."""
+
+    def residuals(self, model, effects):
+        return (self.records[0].measured - (self.rows[0] * effects[0].values["jump"])[:, None],)
+
+
+def test_a_number_at_its_bound_has_no_error_there_and_leaves_it_where_the_data_ask_for_it():
     measure, _ = measured(3, 0.0, 1.0)
-    lowest = hypothesis_of_claim(Claim(EFFECTS["viscous_damping"], "one", (0,)), [{"damping": 1.0}])
-    (number,) = lowest.numbers
-    held = replace(lowest, point=np.array([number.bounds[0]]))
-
-    @dataclass(frozen=True)
-    class Damped(StraightLine):
-        def residuals(self, model, effects):
-            predicted = self.rows[0] * effects[0].values["damping"]
-            return (self.records[0].measured - predicted[:, None],)
-
-    damped = Damped(measure.records, measure.rows, measure.noise, measure.unit)
-    begun = evaluate_fit(damped, TUNING, np.zeros(1), held)
-    assert standard_errors(damped, begun, all_of(damped, begun))[1] == 0.0
-    assert np.any(all_of(damped, begun).columns[1] != 0.0)
+    (record,) = measure.records
+    samples = (measure.rows[0] * FORCE_N)[:, None] + np.random.default_rng(8).standard_normal((SAMPLES, 1))
+    jumping = Jumping((replace(record, measured=samples),), *parts_of(measure))
+    plain = hypothesis_of_claim(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.1, "jump": 0.0}])
+    begun = evaluate_fit(jumping, TUNING, np.zeros(1), plain)
+    assert standard_errors(jumping, begun, all_of(jumping, begun))[-1] == 0.0
+    found, known = finish_fit(jumping, TUNING, begun, lambda at: all_of(jumping, at), lambda: True)
+    jump, error = found.hypothesis.placed_effects()[0].values["jump"], standard_errors(jumping, found, known)[-1]
+    assert error > 0.0
+    assert jump == pytest.approx(FORCE_N, abs=0.03)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
 from analysis.diagnosis.errors.band_power import BandPower
-from analysis.diagnosis.errors.band_power_fit import BandPowerFit
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import NOTHING
@@ -18,7 +17,8 @@ from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.assemble_findings import impact_remainder
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.impacts import _is_gap_open, explain_impacts, is_irregular
+from analysis.diagnosis.search.identifiability import open_effects
+from analysis.diagnosis.search.impacts import explain_impacts, is_irregular
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
 from equalizer.effects.backlash import EFFECT as PLAY
@@ -80,11 +80,15 @@ def test_its_numbers_come_with_errors(told):
     assert np.all((errors > 0) & (errors < 0.5))
 
 
-def test_a_gap_whose_interval_contains_zero_is_not_named(told):
-    last = told.after.fitted
-    fitted = BandPowerFit(last.hypothesis, last.deviations, np.zeros(1), 0.0, told.statistic.errors)
-    assert not _is_gap_open(fitted)
-    assert _is_gap_open(replace(fitted, errors=np.ones_like(fitted.errors)))
+def test_a_gap_whose_interval_contains_zero_is_open(loose, told):
+    assert not any(open_effects(loose[0], told))
+    wide = replace(told.statistic, errors=np.ones_like(told.statistic.errors))
+    assert all(open_effects(loose[0], replace(told, statistic=wide)))
+
+
+def test_play_whose_gap_is_open_is_not_named(loose, monkeypatch):
+    monkeypatch.setattr("analysis.diagnosis.search.identifiability.INTERVAL_FACTOR", 1e6)
+    assert explain_impacts(*loose, CATALOGUE) is None
 
 
 @pytest.mark.slow
