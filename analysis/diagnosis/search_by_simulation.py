@@ -1,6 +1,6 @@
 """The search by simulation: the effects to try, the error measure, and the use of its result."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from analysis.diagnosis.balance.judge_laws import Balance
@@ -14,7 +14,7 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
-from analysis.diagnosis.search.search import HUM, SearchResult, has_law, hums_low, search_effects
+from analysis.diagnosis.search.search import HUM, Beyond, SearchResult, has_law, hums_low, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
 from analysis.diagnosis.types import Mapper, Progress
@@ -117,15 +117,19 @@ def _search_with_learned_error(
 def _search(
     context: SearchContext, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
 ) -> SearchOutcome:
-    def beyond(seen: SearchResult) -> SearchResult:
-        # Low-frequency hum is not accepted as an answer: the search is repeated without it.
-        if not settings.discovery or settings.fitted or hums_low(seen.found):
-            return seen
-        from analysis.diagnosis.discovery.add_laws import add_laws
+    beyond = Beyond()
+    if settings.discovery and not settings.fitted:
+        # Imported here: only a diagnosis that looks for laws needs their grammar.
+        from analysis.diagnosis.discovery.add_laws import LawSearch
 
-        return add_laws(seen, progress, settings.time_left)
-
+        laws = LawSearch(progress, settings.time_left)
+        beyond = Beyond(_unless_hum(laws.add_short), _unless_hum(laws.add_any))
     return SearchOutcome(search_effects(context, catalogue, progress, settings.time_left, beyond), CleanFloor())
+
+
+def _unless_hum(add_laws: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
+    """Low-frequency hum is not accepted as an answer: the search is repeated without it, before any law is added."""
+    return lambda seen: seen if hums_low(seen.found) else add_laws(seen)
 
 
 def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozenset[str]) -> list[Effect]:

@@ -1,7 +1,7 @@
 """Adds a discovered law to a finished search where no catalogue effect is named, or where the law is far better."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,16 +29,50 @@ from equalizer.effects.effect import AxisForce
 from equalizer.laws.law import Law
 
 
-def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) -> SearchResult:
-    """The search with the discovered law in place of its names. Unchanged where it needs no law or none is better; a
-    law that fails a check of `proof` is added as an unconfirmed candidate only."""
-    context, known = result.context, result.found
-    if not _needs_law(result) or not time_left():
-        return result
-    fits = result.judgement.named and known.after.score.worst_channel <= NOISE_ALONE
-    # Beside names that fit, only a single law is the shorter description.
-    found = discover(context, known, progress, time_left, 1 if fits else LAW_MOST_ROUNDS)
-    return result if found is None else weigh_laws(result, found, time_left)
+@dataclass(slots=True)
+class LawSearch:
+    """The search for laws, beyond the catalogue. Laws are looked for beside the re-tuned model, whatever the catalogue
+    found: the same samples are searched once, and what was found is kept for the next call."""
+
+    progress: Progress
+    time_left: TimeBudget
+    _done: list[tuple[FittedCandidate, int, Discovery | None]] = field(default_factory=list)
+    """Per search: the re-tuned model, the most laws, and what was found."""
+
+    def add_short(self, result: SearchResult) -> SearchResult:
+        """As `add_any`, with laws only where they are a shorter description than two effects of the catalogue: a
+        single law of a single term, or laws of which each depends on another axis than its own."""
+        found = self._find(result, LAW_MOST_ROUNDS)
+        if found is None or not _is_short(found):
+            return result
+        return weigh_laws(result, found, self.time_left)
+
+    def add_any(self, result: SearchResult) -> SearchResult:
+        """The search with discovered laws in place of its names. Unchanged where it needs no law or none is better;
+        laws that fail a check of `proof` are added as unconfirmed candidates only."""
+        fits = result.judgement.named and result.found.after.score.worst_channel <= NOISE_ALONE
+        # Beside names that fit, only a single law is the shorter description.
+        found = self._find(result, 1 if fits else LAW_MOST_ROUNDS)
+        return result if found is None else weigh_laws(result, found, self.time_left)
+
+    def _find(self, result: SearchResult, most: int) -> Discovery | None:
+        if not _needs_law(result) or not self.time_left():
+            return None
+        retuned = result.found.retuned
+        for model, laws, found in self._done:
+            if model is retuned and laws == most:
+                return found
+        found = discover(result.context, result.found, self.progress, self.time_left, most)
+        self._done.append((retuned, most, found))
+        return found
+
+
+def _is_short(of: Discovery) -> bool:
+    """Whether laws are a shorter description than two effects: see `LawSearch.add_short`."""
+    if len(of.rounds) == 1 and of.rounds[0].sums[0].partner is None:
+        return len(of.rounds[0].sums[0].terms) == 1
+    laws = [law for law in laws_of(of.found.after.fitted.hypothesis) if law is not None]
+    return all(any(name[-1:] != law.axis for name in law.variables) for law in laws)
 
 
 def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) -> SearchResult:

@@ -123,26 +123,44 @@ def explain(
     """Re-tunes the model and adds effects one by one. time_left: asked before each piece of the search; what was found
     when it says no is kept. begun: per step of a search on fewer samples, it and its rivals; one effect is added to
     these."""
+    found = begin(context, progress, begun)
+    return add_effects(context, catalogue, found, progress, time_left, len(found.rounds) + 1 if begun else MOST_EFFECTS)
+
+
+def begin(context: SearchContext, progress: Progress, begun: Sequence[Sequence[FittedCandidate]] = ()) -> Explanation:
+    """The model as given and re-tuned, with the effects that are not searched for."""
     before = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING)
     progress("re-tuning the model within its tolerances", 0.02)
     base = context.candidate(refine(context, before))
-    confirmed = context.with_test_score(base)
-    surprised = context.references is not None or bool(np.nanmax(confirmed.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     rounds = _known_rounds(context, base, begun)
-    base = (steps := [base, *(each[0] for each in rounds)])[-1]
-    most = len(rounds) + 1 if begun else MOST_EFFECTS
-    within_time, barred, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", False
-    more = SEARCH_ON * (1.0 if context.references is None else context.references.beyond)
-    while (
-        not context.certain
-        and len(rounds) < most
-        and (base.score.worst_channel > (more if rounds else NOISE_ALONE) or (surprised and not rounds))
-    ):
-        step = Step(f"looking for the {_ORDINALS[len(rounds)]} effect", 0.1 + 0.3 * len(rounds), progress)
+    steps = tuple(each[0] for each in rounds)
+    ends = (context.with_test_score(context.candidate(before)), context.with_test_score(base))
+    return Explanation(*ends, context.with_test_score(steps[-1]) if steps else ends[1], tuple(rounds), steps)
+
+
+def add_effects(
+    context: SearchContext,
+    catalogue: Sequence[Effect],
+    found: Explanation,
+    progress: Progress,
+    time_left: TimeBudget = always,
+    most: int = MOST_EFFECTS,
+) -> Explanation:
+    """The explanation with further effects, up to `most` in all. A last round of `found` that brought none is not
+    computed again: a pair is looked for beside its best."""
+    rounds, steps = list(found.rounds), list(found.steps)
+    base = steps[-1] if steps else _without_test_score(context, found.retuned)
+    within_time, barred, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", found.ended_early
+    open_ended = not context.certain and not found.barred and not ended_early
+    while open_ended and len(steps) < most and is_worth_searching(context, found, base):
+        step = Step(f"looking for the {_ORDINALS[len(steps)]} effect", 0.1 + 0.3 * len(steps), progress)
         try:
-            tried = find_next_effect(within_time, catalogue, base.fitted, step)
-            named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
-            rounds.append(named)
+            if len(rounds) > len(steps):
+                tried = named = rounds[-1]
+            else:
+                tried = find_next_effect(within_time, catalogue, base.fitted, step)
+                named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
+                rounds.append(named)
             free = named[:1] == tried[:1] and len(rounds) < most
             both = _look_ahead(within_time, catalogue, base, named, step) if free else ()
         except OutOfTimeError:
@@ -154,8 +172,25 @@ def explain(
             break
         steps += [each[0] for each in both or (named,)]
         base = steps[-1]
-    ends = (context.with_test_score(context.candidate(before)), confirmed, context.with_test_score(base))
-    return Explanation(*ends, tuple(rounds), tuple(steps[1:]), ended_early=ended_early, barred=barred)
+    after = found.after if len(steps) == len(found.steps) else context.with_test_score(base)
+    found = replace(found, after=after, rounds=tuple(rounds), steps=tuple(steps))
+    return replace(found, ended_early=ended_early, barred=barred or found.barred)
+
+
+def _without_test_score(context: SearchContext, scored: FittedCandidate) -> FittedCandidate:
+    """The candidate on the samples to fit and to choose by, of one that was scored on all."""
+    fitted = scored.fitted
+    return context.candidate(evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis))
+
+
+def is_worth_searching(context: SearchContext, found: Explanation, base: FittedCandidate) -> bool:
+    """Whether `base`, the last step of `found`, leaves enough error to look for one more effect."""
+    if base.fitted.hypothesis.claims:
+        beyond = 1.0 if context.references is None else context.references.beyond
+        return base.score.worst_channel > SEARCH_ON * beyond
+    held_out = float(np.nanmax(found.retuned.score.test, initial=0.0))
+    surprised = context.references is not None or held_out > HELD_OUT_SURPRISE
+    return surprised or base.score.worst_channel > NOISE_ALONE
 
 
 def _look_ahead(

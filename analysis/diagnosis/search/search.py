@@ -11,7 +11,9 @@ Theory of operation.
 4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), the
    search is repeated with a part of them opened: all but the loudest segments, else the first half of each stretch.
    What it finds must be confirmed by the part that is still held out.
-5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`).
+5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`). A law that
+   alone explains what the first effect leaves is a shorter description than two effects: it is asked for before the
+   second one is looked for.
 
 Reference recordings of the intact device are used in `reference/search_with_reference`, not here.
 
@@ -28,7 +30,14 @@ from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.explain import Explanation, explain, is_worthwhile
+from analysis.diagnosis.search.explain import (
+    Explanation,
+    add_effects,
+    begin,
+    explain,
+    is_worth_searching,
+    is_worthwhile,
+)
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
 from analysis.diagnosis.search.revise_selection import exchange_effects, without_effect
@@ -133,16 +142,57 @@ class SearchResult:
     """The largest gain first."""
 
 
+@dataclass(frozen=True, slots=True)
+class Beyond:
+    """What is tried where the catalogue leaves a mismatch. Each returns the search with what it names in place of the
+    catalogue's effects, or with candidates, or unchanged."""
+
+    short: Callable[[SearchResult], SearchResult] = lambda seen: seen
+    """Before a second effect is looked for: names only what is a shorter description than two effects."""
+    any: Callable[[SearchResult], SearchResult] = lambda seen: seen
+    """After the last effect, with and without the part of the held-out samples that is opened where only they show the
+    mismatch."""
+
+
 def search_effects(
     context: SearchContext,
     catalogue: Sequence[Effect],
     progress: Progress,
     time_left: TimeBudget = always,
-    beyond: Callable[[SearchResult], SearchResult] = lambda seen: seen,
+    beyond: Beyond = Beyond(),
 ) -> SearchResult:
-    """The search for effects with its verdict. beyond: tried where the catalogue leaves a mismatch, with and without
-    the part of the held-out samples that is opened where only they show it."""
-    found = _explain_and_prune(context, catalogue, progress, time_left)
+    """The search for effects with its verdict."""
+    alone = add_effects(context, catalogue, begin(context, progress), progress, time_left, most=1)
+    early = SearchResult(context, alone, Judgement("unexplained", False))
+    if is_worth_searching(context, alone, alone.after):
+        early = beyond.short(early)
+    if early.judgement.verdict == "explained":
+        return early
+    result = _search_with_pairs(early, alone, catalogue, progress, time_left, beyond.any)
+    # A law that leaves a part is kept for where names leave more, or where the time ended over them.
+    return early if early.judgement.named and not _is_better(result, early) else result
+
+
+def _is_better(result: SearchResult, early: SearchResult) -> bool:
+    """Whether a result is named and explains more than an early one, on held-out samples."""
+    if result.judgement.verdict == "explained" or not result.judgement.named:
+        return result.judgement.named
+    left, before = (float(np.mean(np.log(each.found.after.score.test))) for each in (result, early))
+    return not left > before
+
+
+def _search_with_pairs(
+    early: SearchResult,
+    alone: Explanation,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget,
+    beyond: Callable[[SearchResult], SearchResult],
+) -> SearchResult:
+    """The search that goes on from a first effect, where that leaves enough. alone: the explanation by it."""
+    context = early.context
+    found = add_effects(context, catalogue, alone, progress, time_left)
+    found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     judged = _judge_with_prediction(context, found)
     first = SearchResult(context, found, judged, _remarks(found))
     # What fits where it was fitted is kept even if unconfirmed: a second effect may show in the held-out samples alone.
@@ -185,7 +235,8 @@ def _find_with_opened(
     context = first.context.open_half() if milder is None else milder
     going_on = left is first.found.after and as_good_as_noise(first.found)
     begun = first.found.rounds[: len(first.found.steps)] if going_on else ()
-    found = _explain_and_prune(context, catalogue, progress, time_left, begun)
+    found = explain(context, catalogue, progress, time_left, begun)
+    found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     used = TEST_HALF_USED if milder is None else MILDER_TEST_USED
     return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
 
@@ -210,16 +261,10 @@ def _sites(candidate: FittedCandidate) -> set[tuple[str, int]]:
     return {(claim.effect.name, site) for claim in candidate.fitted.hypothesis.claims for site in claim.sites}
 
 
-def _explain_and_prune(
-    context: SearchContext,
-    catalogue: Sequence[Effect],
-    progress: Progress,
-    time_left: TimeBudget,
-    begun: Sequence[Sequence[FittedCandidate]] = (),
+def _exchange_and_prune(
+    context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
-    """Forward selection, exchange and backward elimination; where the last two crash, nothing is named. begun: as for
-    `explain`."""
-    found = explain(context, catalogue, progress, time_left, begun)
+    """Exchange and backward elimination after forward selection; where they crash, nothing is named."""
     nothing = replace(found, after=found.retuned, steps=())
     newest = found.steps[-1].newest if found.steps else ""
 

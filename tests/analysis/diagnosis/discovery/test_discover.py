@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.discovery.add_laws import add_laws
+from analysis.diagnosis.discovery.add_laws import LawSearch
 from analysis.diagnosis.discovery.beam import best_sums
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.fit_sum import Sum
@@ -94,7 +94,7 @@ def test_ten_times_the_noise_leaves_the_law(seed=6):
 
 def joined(recording):
     context, known = arena_of(recording)
-    return add_laws(SearchResult(context, known, judge(known)), quiet, always)
+    return LawSearch(quiet, always).add_any(SearchResult(context, known, judge(known)))
 
 
 def test_a_proved_law_explains(seed=7):

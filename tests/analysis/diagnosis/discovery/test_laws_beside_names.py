@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.discovery.add_laws import add_laws, may_stand_for_a_law, weigh_laws
+from analysis.diagnosis.discovery.add_laws import LawSearch, may_stand_for_a_law, weigh_laws
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.discovery.proof import does_as_well_with_less
@@ -87,7 +87,7 @@ def test_the_shorter_law_takes_the_place_of_names_that_fit(hardened):
     cube, stop = claim("hardening_stiffness", k3=CUBIC), claim("end_stop", position=1.0, stiffness=1e3, opposite=1.0)
     names = named(hardened, cube, stop)
     assert judge(names).verdict == "explained"
-    said = add_laws(SearchResult(context, names, judge(names)), quiet, always)
+    said = LawSearch(quiet, always).add_any(SearchResult(context, names, judge(names)))
     (found,) = laws_of(said.found.after.fitted.hypothesis)
     assert found.expression.endswith("x**3")
     assert found.numbers[0] == pytest.approx(-CUBIC, rel=0.02)
@@ -98,7 +98,7 @@ def test_a_name_that_is_as_short_stays(hardened):
     context, _ = hardened
     cube = named(hardened, claim("hardening_stiffness", k3=CUBIC))
     result = SearchResult(context, cube, judge(cube))
-    assert add_laws(result, quiet, always) is result
+    assert LawSearch(quiet, always).add_any(result) is result
     found = discover(context, cube, quiet, always, 1)
     assert not does_as_well_with_less(context, found, cube.after)
 

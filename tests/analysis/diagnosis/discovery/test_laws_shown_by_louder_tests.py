@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.discovery.add_laws import add_laws, weigh_laws
+from analysis.diagnosis.discovery.add_laws import LawSearch, weigh_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round, discover
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.law_of_sum import laws_of
@@ -40,7 +40,7 @@ def searched():
 def test_a_law_that_takes_nearly_all_of_a_louder_error_is_named_though_some_noises_are_left(searched):
     context, known, found = searched
     assert found.found.after.score.test.max() > 3
-    named = add_laws(SearchResult(context, known, judge(known)), quiet, always)
+    named = LawSearch(quiet, always).add_any(SearchResult(context, known, judge(known)))
     assert named.judgement.named
     laws = laws_of(named.found.after.fitted.hypothesis)
     assert laws[0].variables == ("x",)
