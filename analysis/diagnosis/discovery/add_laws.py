@@ -40,11 +40,13 @@ class LawSearch:
     """Per search: the re-tuned model, the most laws, and what was found."""
 
     def add_short(self, result: SearchResult) -> SearchResult:
-        """As `add_any`, with laws only where they are a shorter description than two effects of the catalogue: a
-        single law of a single term, or laws of which each depends on another axis than its own."""
-        found = self._find(result, LAW_MOST_ROUNDS)
+        """As `add_any`, with laws only where they are likely to explain all, and are a shorter description than two
+        effects of the catalogue: a single law of a single term, or laws of which each depends on another axis than its
+        own."""
+        found = self._discover(result, LAW_MOST_ROUNDS, alone=True)
         if found is None or not _is_short(found):
             return result
+        self._done.append((result.found.retuned, LAW_MOST_ROUNDS, found))
         return weigh_laws(result, found, self.time_left)
 
     def add_any(self, result: SearchResult) -> SearchResult:
@@ -52,19 +54,20 @@ class LawSearch:
         laws that fail a check of `proof` are added as unconfirmed candidates only."""
         fits = result.judgement.named and result.found.after.score.worst_channel <= NOISE_ALONE
         # Beside names that fit, only a single law is the shorter description.
-        found = self._find(result, 1 if fits else LAW_MOST_ROUNDS)
+        most = 1 if fits else LAW_MOST_ROUNDS
+        retuned = result.found.retuned
+        known = [found for model, laws, found in self._done if model is retuned and laws == most]
+        if known and not self.time_left():
+            return result
+        found = known[0] if known else self._discover(result, most)
+        if not known:
+            self._done.append((retuned, most, found))
         return result if found is None else weigh_laws(result, found, self.time_left)
 
-    def _find(self, result: SearchResult, most: int) -> Discovery | None:
+    def _discover(self, result: SearchResult, most: int, alone: bool = False) -> Discovery | None:
         if not _needs_law(result) or not self.time_left():
             return None
-        retuned = result.found.retuned
-        for model, laws, found in self._done:
-            if model is retuned and laws == most:
-                return found
-        found = discover(result.context, result.found, self.progress, self.time_left, most)
-        self._done.append((retuned, most, found))
-        return found
+        return discover(result.context, result.found, self.progress, self.time_left, most, alone)
 
 
 def _is_short(of: Discovery) -> bool:

@@ -26,6 +26,8 @@ from analysis.diagnosis.search.explain import Explanation, is_worthwhile
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import limit_map
 from analysis.diagnosis.settings import (
+    EXPLAINED_ERROR,
+    LAW_ALONE_LEAVES,
     LAW_ALMOST_NOISE,
     LAW_AXES_SHARE,
     LAW_COMMAND_TAKEN,
@@ -77,9 +79,10 @@ def discover(
     progress: Progress,
     time_left: TimeBudget,
     most: int = LAW_MOST_ROUNDS,
+    alone: bool = False,
 ) -> Discovery | None:
     """The laws found, at most `most`, fitted by output error; None where none is worth its numbers. known: what the
-    named effects explain."""
+    named effects explain. alone: only laws that are likely to explain all; given up as soon as they are seen not to."""
     context = replace(context, map_=limit_map(context.map_, time_left))
     retuned = known.retuned.fitted
     base = context.candidate(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
@@ -87,7 +90,7 @@ def discover(
     steps: list[FittedCandidate] = []
     while len(rounds) < most and time_left() and base.score.worst_channel > NOISE_ALONE:
         progress("looking for a law that has no name", 0.6 + 0.1 * len(rounds))
-        found = _find_next_law(context, base.fitted, time_left)
+        found = _find_next_law(context, base.fitted, time_left, alone)
         if found is None or not is_worthwhile(base, found.fitted_candidates[0]):
             break
         if found.sums[0].partner is not None:
@@ -95,6 +98,8 @@ def discover(
         base = found.fitted_candidates[0]
         rounds.append(found)
         steps.append(base)
+        if alone and base.score.worst_channel > EXPLAINED_ERROR and not _has_counterpart(found.sums[0]):
+            return None
     if not rounds:
         return None
     snapped = within_time(lambda: snap_exponents(context, base.fitted), base.fitted)
@@ -110,13 +115,18 @@ def discover(
     return Discovery(whole, tuple(rounds))
 
 
+def _has_counterpart(of: Sum) -> bool:
+    """Whether a law depends on the motion of another axis, on which a law of the same kind may act."""
+    return any(name[-1:] in AXES and name[-1:] != AXES[of.axis] for name in of.variables)
+
+
 def _first_half(context: SearchContext, pair: FittedCandidate) -> FittedCandidate:
     """The candidate without the second law of its pair: each named law has a step of its own."""
     hypothesis = without_claim(pair.fitted.hypothesis, len(pair.fitted.hypothesis.claims) - 1)
     return context.candidate(evaluate_fit(context.measure, context.tuning, pair.fitted.deviations, hypothesis))
 
 
-def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) -> Round | None:
+def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget, alone: bool) -> Round | None:
     views = views_of(context.measure, context.tuning, base)
     searched = [(view, best_sums(products_of(view), view_terms(view), time_left)) for view in _views_to_search(views)]
     every = sorted(
@@ -128,6 +138,8 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget) 
         reverse=True,
     )
     chosen = _choose_sums_to_fit(_keep_close_to_best(_best_of_each_structure(every)))
+    if alone and chosen and chosen[0].cross_validated - 1 > LAW_ALONE_LEAVES * (chosen[0].without - 1):
+        return None
     pairs = fit_sums(context, base, chosen, time_left)
     if not pairs:
         return None
