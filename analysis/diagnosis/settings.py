@@ -179,8 +179,8 @@ LAW_MOST_ROUNDS = 3  # laws that are added one after the other
 LAW_SNAP = 0.003  # relative: so near a simple exponent, and so much more error, change nothing for a reader
 LAW_BEATS = 0.5  # of a catalogue rival's excess that a law may leave at most
 # of the missing force above the noise that a law may leave in the linear screen to be fitted before a second effect is
-# looked for; where a law was the whole truth it left at most 0.01 (one of 11: 0.07), beside a second effect 0.03 or more
-# in 11 of 14 (seeds 642000 and 99950)
+# looked for. Where a law was the whole truth, it left at most 0.01 (one of 11: 0.07); beside a second effect, 0.03 or
+# more in 10 of 14 (laws of seed 642000, pairs of seed 99950)
 LAW_ALONE_LEAVES = 0.05
 LAW_STABLE = 0.2  # jackknife error of a factor over stretches, as a share; principle: five standard errors from none
 LAW_PLACEBO = 0.5  # of what chance leaves of a shuffled force, that a law may leave of the missing one at most

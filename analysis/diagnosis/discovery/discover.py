@@ -27,8 +27,8 @@ from analysis.diagnosis.search.search_context import FittedCandidate, SearchCont
 from analysis.diagnosis.search.time_budget import limit_map
 from analysis.diagnosis.settings import (
     EXPLAINED_ERROR,
-    LAW_ALONE_LEAVES,
     LAW_ALMOST_NOISE,
+    LAW_ALONE_LEAVES,
     LAW_AXES_SHARE,
     LAW_COMMAND_TAKEN,
     LAW_FITTED,

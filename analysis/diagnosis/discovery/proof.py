@@ -157,9 +157,9 @@ def _predict_the_same(without: FittedCandidate, law: FittedCandidate, other: Fit
 
 
 def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
-    """Whether a law's excess error is so far below a named effect's that it replaces the name, and its error on held-out
-    samples is lower by more than the noise is known to: the same formula under a name of its own is no better. Both
-    with held-out errors."""
+    """Whether a law's excess error is so far below a named effect's that it replaces the name, and its error on
+    held-out samples is lower by more than the noise is known to: the same formula under a name of its own is no better.
+    Both with held-out errors."""
     held_out, other = (float(np.mean(np.log(each.score.test))) for each in (law, rival))
     if np.isfinite(held_out) and held_out >= other - NOISE_KNOWN_TO:
         return False
