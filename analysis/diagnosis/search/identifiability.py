@@ -217,12 +217,13 @@ def distance_from_none(
 ) -> float:
     """Distance of an effect's only number from no effect, in half widths of its profile interval; above 1, the interval
     excludes no effect. effect: its place."""
-    with_it = found.steps[-1].fitted
+    last = found.steps[-1].fitted
     fewer = found.retuned if len(found.steps) == 1 else without_effect(context, found, effect).steps[-1]
-    # The re-tuned model is kept as it is on all samples. Both fits end at their minimum: else the difference is not all
+    # The re-tuned model, and at times the last step, is kept as it is on all samples. Both fits end at their minimum: else the difference is not all
     # the effect's.
     start = evaluate_fit(context.measure, context.tuning, fewer.fitted.deviations, fewer.fitted.hypothesis)
     without = _finish(context, start, time_left)[0]
+    with_it = evaluate_fit(context.measure, context.tuning, last.deviations, last.hypothesis)
     gained = np.concatenate([
         _stretches(context.measure, without) - _stretches(context.measure, with_it),
         # The calibration is an observation of its own.

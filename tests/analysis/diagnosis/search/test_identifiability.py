@@ -124,6 +124,15 @@ def test_the_profile_distinguishes_a_present_number_from_zero_and_an_absent_one_
     assert distance_from_none(rubbing, both, 1) < 1
 
 
+def test_a_step_that_was_scored_on_all_samples_has_the_same_profile(rubbing):
+    """A law that held-out samples chose is such a step; its residuals have other shapes than those of the search."""
+    both = fitted(rubbing, FRICTION, OPEN)
+    scored = replace(both, steps=(*both.steps[:-1], both.after))
+    shapes = [[left.shape for left in each.steps[-1].fitted.residuals] for each in (both, scored)]
+    assert shapes[0] != shapes[1]
+    assert distance_from_none(rubbing, scored, 1) == pytest.approx(distance_from_none(rubbing, both, 1))
+
+
 def test_an_interval_that_contains_zero_is_corrected_by_the_profile_likelihood(rubbing, monkeypatch):
     found = fitted(rubbing, FRICTION)
     place, level = len(rubbing.tuning.names), found.after.fitted.hypothesis.placed_effects()[0].values["level"]
