@@ -12,7 +12,12 @@ from analysis.diagnosis.confirm.confirm_laws import (
     require_enough_gain,
     search_by_balance,
 )
-from analysis.diagnosis.confirm.fitting_measures import FittingMeasure, choose_fitting_measure, list_fitting_measures
+from analysis.diagnosis.confirm.fitting_measures import (
+    FittingMeasure,
+    choose_fitting_measure,
+    choose_plain_forces,
+    list_fitting_measures,
+)
 from analysis.diagnosis.data.input_checks import is_too_short_to_name
 from analysis.diagnosis.data.observed_parts import names_of_parts
 from analysis.diagnosis.diagnosis_settings import BALANCE, DiagnosisSettings
@@ -78,6 +83,8 @@ def _diagnose_by_model(
     balances: tuple[Balance, ...] = (),
 ) -> Findings:
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
+    if settings.fitted:
+        fitting = choose_plain_forces(recordings, fitting, balances)
     if settings.fitted and is_too_short_to_name(recordings):
         unsearched = SearchOutcome(_unsearched(recordings, fitting, settings, map_), CleanFloor())
         return _assemble(recordings, settings, fitting, unsearched, balances)

@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.balance.actuator import DrivenAxis, find_balance
 from analysis.diagnosis.balance.actuator_equivalents import doubt_laws_of_actuator
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
-from analysis.diagnosis.balance.linear_part import search_beside_linear
+from analysis.diagnosis.balance.linear_part import driven_motion, search_beside_linear
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motion_band_hz, motions_of
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observed_parts
@@ -60,9 +60,9 @@ def look_again(
 
 
 def motions_in_own_band(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
-    """Filter the motions to the band in which the device moves; empty where that band is hardly narrower. Raises
-    NoMotionError."""
-    narrow_hz = motion_band_hz(motions)
+    """Filter the motions to the band in which the driven motions are; empty where that band is hardly narrower. A
+    further motion, such as the deflection of a beam, may be noise at high frequencies. Raises NoMotionError."""
+    narrow_hz = motion_band_hz(motions, driven_motion(motions))
     return motions_of(records, narrow_hz) if narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz else ()
 
 

@@ -6,7 +6,7 @@ underestimate the mass by more (errors in variables; Soderstrom, Automatica 43:9
 above the lower end of the band, found likewise from the position, because below it their integrals are drift.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -130,12 +130,12 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
     )
 
 
-def motion_band_hz(motions: Sequence[Motion]) -> float:
-    """The highest frequency of a channel's motion; inf without a time axis."""
+def motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) -> float:
+    """The highest frequency of the motion of some channels; inf without a time axis."""
     if not np.isfinite(motions[0].band_hz):
         return np.inf
     ends = []
-    for column in range(len(motions[0].channels)):
+    for column in columns:
         power, frequency_hz = [], []
         for motion in motions:
             speed = motion.velocity[:, column]

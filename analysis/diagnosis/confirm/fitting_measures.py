@@ -32,6 +32,12 @@ ABOUT_MEAN = (
 )
 
 
+BALANCE_LEAVES_LESS = (
+    "Forces are predicted with the linear numbers of the force balance: they leave less of the forces than the model "
+    "that was fitted to spectra."
+)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FittingMeasure:
     """A model, and the error measure of its fit."""
@@ -119,6 +125,44 @@ def list_fitting_measures(
             )
     except (MechanicalModelError, np.linalg.LinAlgError):
         return
+
+
+def choose_plain_forces(
+    recordings: Sequence[Recording], fitting: FittingMeasure, balances: Sequence[Balance]
+) -> FittingMeasure:
+    """Where forces are compared and no law is named: the balance's own linear numbers in place of the fitted model's,
+    where these leave more of the forces, on the samples to fit and to choose by. A model that was fitted to spectra in
+    closed loop may need modes that the measured motions of a second body make unnecessary."""
+    measure = fitting.chosen.measure
+    named = any(balance.named for balance in balances)
+    if not balances or named or not isinstance(measure, PredictedForce):
+        return fitting
+    try:
+        reduced = reduce_recordings(recordings, balances) if is_reduced(balances) else recordings
+        plain = first_model(balances, reduced[0], fitting.model.name)
+        if plain is None:
+            return fitting
+        other = measure_by_force(reduced, plain, measure.band_hz)
+    except (MechanicalModelError, np.linalg.LinAlgError):
+        return fitting
+    if not isinstance(other.measure, PredictedForce):
+        return fitting
+    forces = np.vstack([record.command[record.fit | record.choose] for record in measure.records])
+    size = np.maximum(np.sqrt(np.mean(forces**2, axis=0)), 1e-300)
+    if not _missed_force(plain, other.measure, size) < _missed_force(fitting.model, measure, size):
+        return fitting
+    return FittingMeasure(plain, replace(other, remarks=(*other.remarks, BALANCE_LEAVES_LESS)))
+
+
+def _missed_force(model: MechanicalModel, measure: PredictedForce, size: FloatArray) -> float:
+    """Rms error of the force that the unchanged model needs, over all axes, on the samples to fit and to choose by.
+    size: (m,): unit of each axis."""
+    residuals = measure.residuals(model, ())
+    missed = [
+        left[record.fit | record.choose] * measure.unit / size
+        for left, record in zip(residuals, measure.records, strict=True)
+    ]
+    return float(np.sqrt(np.mean(np.vstack(missed) ** 2)))
 
 
 LEAST_STIFFNESS_RATIO = 1e-6

@@ -39,7 +39,7 @@ def test_a_spring_that_hardens_shows_in_the_band_of_the_motion(recorded, balance
     recording = recorded(1.5)
     motions = motions_of(observed_parts([recording], 1))
     (balance,) = balance_of(recording)
-    assert balance.search.regression.motions[0].band_hz == pytest.approx(motion_band_hz(motions))
+    assert balance.search.regression.motions[0].band_hz == pytest.approx(motion_band_hz(motions, [0]))
     (law,) = balance.named
     assert "hardening_stiffness" in (law.law.effect, *law.alike)
     assert law.gain_low > 0.1
@@ -53,4 +53,4 @@ def test_a_slow_course_moves_in_a_narrow_band(recording_of):
     time_s = np.arange(3000) / RATE_HZ
     slow = np.sin(2 * np.pi * time_s) + 0.001 * np.sin(2 * np.pi * 30 * time_s)
     motions = motions_of(observed_parts([recording_of(slow[:, None], slow[:, None], RATE_HZ)], 1))
-    assert motion_band_hz(motions) == pytest.approx(1.0, abs=0.2)
+    assert motion_band_hz(motions, [0]) == pytest.approx(1.0, abs=0.2)

@@ -1,0 +1,102 @@
+"""A hub that turns a beam, whose deflection is measured with noise: laws of the hub show in the band of the hub."""
+
+import numpy as np
+import pytest
+
+from analysis.diagnosis.balance.balances import motions_in_own_band
+from analysis.diagnosis.balance.motion import motion_band_hz, motions_of
+from analysis.diagnosis.confirm.fitting_measures import BALANCE_LEAVES_LESS, choose_fitting_measure, choose_plain_forces
+from analysis.diagnosis.data.observed_parts import observed_parts
+from equalizer.plant.mechanical_model import MechanicalModel
+
+RATE_HZ, SECONDS, FINE = 500.0, 5.0, 20
+HUB, DRAG, BEAM, BEAM_HZ, BEAM_DAMPING = 8e-3, 0.5, 6e-3, 3.0, 0.02
+GAIN, FRICTION, BRISTLE = 9.5, 0.2, 5e-4
+STEP, GAUGE_NOISE = np.deg2rad(0.088), np.deg2rad(0.6)
+
+
+def turned(friction, seed):
+    """Voltage (n,), hub angle and deflection (n, 2), in rad: a square reference under feedback with noise in it."""
+    rng = np.random.default_rng(seed)
+    count, dt = int(RATE_HZ * SECONDS), 1 / (FINE * RATE_HZ)
+    reference = np.repeat(np.where(np.arange(8) % 2 == 0, 0.5, -0.5), count // 8 + 1)[:count]
+    reference += 0.02 * np.convolve(rng.standard_normal(count), np.ones(25) / 5, "same")
+    omega = 2 * np.pi * BEAM_HZ
+    hub = speed = bend = bending = bristle = 0.0
+    command, motion = np.zeros(count), np.zeros((count, 2))
+    for k in range(count):
+        command[k] = GAIN * (reference[k] - hub) - 0.2 * speed
+        motion[k] = hub, bend
+        for _ in range(FINE):
+            bristle = np.clip(bristle + dt * speed, -BRISTLE, BRISTLE)
+            spring = BEAM * (omega**2 * bend + 2 * BEAM_DAMPING * omega * bending)
+            turn = (command[k] - DRAG * speed - friction * bristle / BRISTLE + spring) / HUB
+            bending += dt * (-turn - spring / BEAM)
+            speed += dt * turn
+            hub += dt * speed
+            bend += dt * bending
+    encoder = STEP * np.round(motion[:, :1] / STEP)
+    return command, np.hstack([encoder, motion[:, 1:] + GAUGE_NOISE * rng.standard_normal((count, 1))])
+
+
+@pytest.fixture
+def recorded(recording_of):
+    def made(friction, seed=3):
+        command, motion = turned(friction, seed)
+        return recording_of(command[:, None], motion, RATE_HZ)
+
+    return made
+
+
+def test_the_band_of_the_motion_is_that_of_the_driven_one(recorded):
+    records = observed_parts([recorded(FRICTION)], 2)
+    motions = motions_of(records)
+    hub_hz, both_hz = motion_band_hz(motions, [0]), motion_band_hz(motions, [0, 1])
+    (narrow,) = motions_in_own_band(records, motions)
+    assert narrow.band_hz == pytest.approx(hub_hz)
+    assert hub_hz < 0.8 * both_hz
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_friction_of_the_hub_is_named_beside_the_beam(recorded, balance_of, seed):
+    (balance,) = balance_of(recorded(FRICTION, seed))
+    assert [law.law.effect for law in balance.named] in (["coulomb_friction"], ["presliding_hysteresis"])
+    assert balance.named[0].values["level"] == pytest.approx(FRICTION, rel=0.2)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_without_friction_nothing_is_named(recorded, balance_of, seed):
+    assert not balance_of(recorded(0.0, seed))[0].named
+
+
+def hub_and_beam(hub):
+    """Two bodies, of which the second is the beam's deflection; the hub's inertia is `hub`."""
+    drag, spring = np.diag([DRAG, 1e-3]), np.diag([0.0, BEAM * (2 * np.pi * BEAM_HZ) ** 2])
+    return MechanicalModel(
+        "fitted", "position", np.diag([hub, BEAM]), drag, spring, np.array([[1.0], [0.0]]), np.eye(2)
+    )
+
+
+def test_where_no_law_is_named_the_linear_numbers_that_leave_less_of_the_forces_are_taken(recorded, balance_of):
+    recording = recorded(0.0)
+    balances = balance_of(recording)
+    given = choose_fitting_measure([recording], hub_and_beam(5 * HUB), (), "force", about_mean=True)
+    plain = choose_plain_forces([recording], given, balances)
+    assert plain.model.mass.shape == (1, 1)
+    assert BALANCE_LEAVES_LESS in plain.chosen.remarks
+    left = [rms_of_forces(each) for each in (given, plain)]
+    assert left[1] < 0.3 * left[0]
+
+
+def test_with_a_named_law_or_without_balances_the_model_stays(recorded, balance_of):
+    recording = recorded(FRICTION)
+    given = choose_fitting_measure([recording], hub_and_beam(5 * HUB), (), "force", about_mean=True)
+    assert choose_plain_forces([recording], given, balance_of(recording)) is given
+    assert choose_plain_forces([recording], given, ()) is given
+
+
+def rms_of_forces(fitting):
+    measure = fitting.chosen.measure
+    left = measure.residuals(fitting.model, ())
+    used = [each[record.fit] for each, record in zip(left, measure.records, strict=True)]
+    return measure.unit[0] * np.sqrt(np.mean(np.vstack(used) ** 2))
