@@ -56,6 +56,7 @@ from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
+LAW_BEYOND = "a law outside the catalogue"
 HUM, LOWEST_MAINS_HZ = "mains_hum", 45.0
 
 
@@ -162,6 +163,7 @@ def search_effects(
     beyond: Beyond = Beyond(),
 ) -> SearchResult:
     """The search for effects with its verdict."""
+    beyond = Beyond(_guarded(beyond.short), _guarded(beyond.any))
     alone = add_effects(context, catalogue, begin(context, progress), progress, time_left, most=1)
     early = SearchResult(context, alone, Judgement("unexplained", False))
     if is_worth_searching(context, alone, alone.after):
@@ -171,6 +173,11 @@ def search_effects(
     result = _search_with_pairs(early, alone, catalogue, progress, time_left, beyond.any)
     # A law that leaves a part is kept for where names leave more, or where the time ended over them.
     return early if early.judgement.named and not _is_better(result, early) else result
+
+
+def _guarded(add: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
+    """With the search unchanged where it crashes."""
+    return lambda seen: seen.context.guard.part(LAW_BEYOND, "its search", lambda: add(seen), seen)
 
 
 def _is_better(result: SearchResult, early: SearchResult) -> bool:
