@@ -11,10 +11,9 @@ import numpy as np
 from equalizer.effects.effect import Acts, AxisForce, Effect, OnCommand, OnResponse, Parameter, Values
 from equalizer.effects.simulation.law_kernel import PER_AXIS, law_force
 from equalizer.laws.evaluate import evaluate, evaluate_held
-from equalizer.laws.law import Law
+from equalizer.laws.law import Law, Role, roles
 from equalizer.laws.parse import FUNCTIONS, MEMORY
 from equalizer.laws.program import DEEPEST, program_of
-from equalizer.laws.roles import Role, roles
 from equalizer.laws.tree import Apply, Node, Variable, nodes
 from equalizer.laws.units import FORCE, NONE, SECOND, motion_dimension, units_of
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW

@@ -19,8 +19,7 @@ from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
 from equalizer.laws.evaluate import evaluate
-from equalizer.laws.law import Law
-from equalizer.laws.roles import roles
+from equalizer.laws.law import Law, roles
 from equalizer.laws.tree import Apply, Node, Variable, format_formula
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray

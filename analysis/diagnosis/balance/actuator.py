@@ -30,12 +30,13 @@ from analysis.diagnosis.balance.command_laws import (
 )
 from analysis.diagnosis.balance.inverse_balance import InverseBalance
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
-from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw, bootstrap_draws, gain_with_bound
+from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, StructureSearch
+from analysis.diagnosis.data.correlated_residuals import bootstrap_draws, gain_with_bound
 from analysis.diagnosis.settings import (
     COMMAND_LAW_LEAVES,
     COMMAND_RIVAL_LEAVES_MORE,

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
+from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.structures import values_of
+from analysis.diagnosis.confirm.require_gain import CONSTANT
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
@@ -16,7 +17,6 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-CONSTANT = "constant_force"
 _OWN = re.compile(r"\b[qvf]\b")
 _PREFIX = {"q": "", "v": "v", "f": "f"}
 """Signals of an axis in the language of laws, by their names in a balance's formula."""
@@ -40,11 +40,11 @@ def refit_laws(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw
     """The laws with the parameters that the balances give when only these laws are fitted."""
     found = []
     for axis, law in named:
-        if law.place == NO_COLUMN:
+        if not law.has_column:
             found.append((axis, law))
             continue
         regression = balances[axis].search.regression
-        places = [other.place for of, other in named if of == axis and other.place != NO_COLUMN]
+        places = [other.place for of, other in named if of == axis and other.has_column]
         values = values_of(regression, places)[places.index(law.place)]
         found.append((axis, law if values is None else _with_values(law, values)))
     return found

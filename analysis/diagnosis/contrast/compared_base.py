@@ -18,7 +18,7 @@ from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
-from analysis.diagnosis.data.lagged_products import lagged_products
+from analysis.diagnosis.data.correlated_residuals import lagged_products
 from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_KEPT
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray

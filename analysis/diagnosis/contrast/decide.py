@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from analysis.diagnosis.balance.judged_law import bootstrap_draws
 from analysis.diagnosis.contrast.compare import FOLDS
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
+from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,

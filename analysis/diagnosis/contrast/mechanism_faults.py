@@ -10,7 +10,7 @@ from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, proportional_number
 from analysis.diagnosis.contrast.part import Part
-from equalizer.effects.simulation.bristle_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Shape = Callable[[Motion], FloatArray]

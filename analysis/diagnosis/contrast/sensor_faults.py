@@ -28,7 +28,7 @@ from analysis.diagnosis.contrast.fault import (
 from analysis.diagnosis.contrast.interpolation import noise_kept, resample, shift_samples
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
-from equalizer.effects.simulation.bristle_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Read = Callable[[FloatArray, float], FloatArray]

@@ -18,8 +18,8 @@ from analysis.diagnosis.discovery.grammar import AXES, Columns
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import MOVED, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.forces.missing_force import axis_transfer
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.forces.transfer import axis_transfer
 from analysis.diagnosis.settings import LAW_BLOCKS, LAW_POWER_KEPT, SETTLED_CONSTANTS
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.law import ActsOn

@@ -14,8 +14,7 @@ from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, SearchContext
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
 from equalizer.effects.discovered_law import law_channels, law_effect, law_values
-from equalizer.laws.law import Law
-from equalizer.laws.roles import roles
+from equalizer.laws.law import Law, roles
 
 _CUBE_WITH_MEMORY = re.compile(r"\b(\w+)\*lag\(\1\*\*2, (?:p(\d+)|0)\)")
 _LIMIT = re.compile(r"(\w+) \+ p0\*\((.+) - \1\)")

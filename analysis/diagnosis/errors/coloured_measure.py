@@ -13,7 +13,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 
-from analysis.diagnosis.data.lagged_products import lagged_products
+from analysis.diagnosis.data.correlated_residuals import lagged_products
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.types import Mask

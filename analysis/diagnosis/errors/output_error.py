@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.data.growth_rate import is_unstable_within
+from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis, move_point
 from analysis.diagnosis.errors.tuning import Tuning

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import is_quasi_static
+from analysis.diagnosis.data.recorded_conditions import as_recorded
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.first_model.reversed_commands import as_recorded
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, clean_floor_sentence
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, whole_mismatch

@@ -5,10 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.document import Estimate, NamedEffect, Rival
+from analysis.diagnosis.document import Estimate, FoundLaw, NamedEffect, Rival, found_law
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis
-from analysis.diagnosis.found_law import FoundLaw, found_law
-from analysis.diagnosis.result.impact_wording import BY_CHANCE, BY_NOISE
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand, only_refines
 from analysis.diagnosis.search.search_context import FittedCandidate
@@ -31,6 +29,9 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
+
+BY_CHANCE = "what chance makes of it"
+BY_NOISE = "the noise"
 
 _SAME_ERROR = 0.005
 """Relative difference below which two errors count as the same."""

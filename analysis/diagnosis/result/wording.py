@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
+from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect, law_text
 from analysis.diagnosis.effect_words import OF_THE_WHOLE, noun_of, numbers_text, place_words
-from analysis.diagnosis.found_law import law_text
 from analysis.diagnosis.result.candidate_wording import (
     REFINED,
     Device,

@@ -105,3 +105,17 @@ def friction_force(forward: float, backward: float, start: float, memory: FloatA
     far = ends[0] if v > 0 else ends[1]
     memory[0], at[F_END] = bend, -level * (bend + (damping * (v - abs(v) * bend / far) if far > 0 else 0.0))
     return -level * impulse * share
+
+
+_PATH = types.Array(types.float64, 1, "A", readonly=True)
+
+
+@njit(types.float64[::1](_PATH, types.float64), cache=True)
+def bristle_bend(position: FloatArray, longest: float) -> FloatArray:
+    """(n,): deflection over `longest`, at which the bristle slips (Dahl's equation). position: (n,), any unit."""
+    bend = np.zeros(position.shape[0])
+    for k in range(1, position.shape[0]):
+        travel = (position[k] - position[k - 1]) / longest
+        full = np.sign(travel)
+        bend[k] = full + (bend[k - 1] - full) * np.exp(-abs(travel))
+    return bend

@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.result.curves.signature_bins import bin_means
 from analysis.diagnosis.types import Mask
@@ -17,6 +15,12 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import system_of
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.balance.judge_laws import Balance
+    from analysis.diagnosis.balance.motion import Motion
+    from analysis.diagnosis.balance.regression import Regression
+
 
 CLOUD = 600
 """Number of single samples that are drawn."""
@@ -94,7 +98,7 @@ class _AxisSeries:
 
 
 def state_maps(
-    diagnosis: Diagnosis, balances: Sequence[Balance], evidence: Sequence[Evidence], recording: Recording
+    diagnosis: Diagnosis, balances: "Sequence[Balance]", evidence: Sequence[Evidence], recording: Recording
 ) -> tuple[StateMaps, ...]:
     """Maps of all axes, in the order of drawing: the axis of the first named effect, then by missing force. From the
     force balances where there are any; else from the evidence of the re-tuned model."""
@@ -117,7 +121,7 @@ def state_maps(
     return tuple(sorted(found, key=lambda each: (each.axis != first, -each.share)))
 
 
-def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_AxisSeries | None, str]:
+def _of_balance(balance: "Balance", diagnosis: Diagnosis, letter: str) -> tuple[_AxisSeries | None, str]:
     regression = balance.search.regression
     names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
     named = [law.place for law in balance.laws if law.played_as in names]
@@ -139,11 +143,11 @@ def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_A
     return (series if series.used.any() else None), (NAMED if named else NOT_CONFIRMED if laws else "")
 
 
-def _explained_forces(regression: Regression, remainder: Sequence[FloatArray]) -> list[FloatArray]:
+def _explained_forces(regression: "Regression", remainder: Sequence[FloatArray]) -> list[FloatArray]:
     return [force - left for force, left in zip(regression.force, remainder, strict=True)]
 
 
-def _seconds(motions: Sequence[Motion]) -> FloatArray:
+def _seconds(motions: "Sequence[Motion]") -> FloatArray:
     count = sum(len(motion.force[:: motion.step]) for motion in motions)
     return np.asarray(np.arange(count) * motions[0].step / motions[0].rate_hz)
 

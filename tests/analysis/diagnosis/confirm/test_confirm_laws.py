@@ -8,17 +8,17 @@ import pytest
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.laws import _stop_values
 from analysis.diagnosis.confirm import confirm_laws as by_balance
+from analysis.diagnosis.confirm import require_gain
 from analysis.diagnosis.confirm.confirm_laws import (
-    ONLY_BESIDE_CALIBRATION,
     VAGUE,
     _find_vague_law,
     _from_starts,
     _prefer_special_case,
     open_refinements,
-    unname_doubtful_effects,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
 from analysis.diagnosis.confirm.laws_for_simulation import can_be_played, find_special_case, hypothesis_of_judged
+from analysis.diagnosis.confirm.require_gain import ONLY_BESIDE_CALIBRATION, unname_doubtful_effects
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search import SearchResult
@@ -182,7 +182,7 @@ def searched_to(*names):
 
 @pytest.fixture
 def gains_half(monkeypatch):
-    monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(0.5, 0.4, 0.6))
+    monkeypatch.setattr(require_gain, "held_out_gain", lambda *_: HeldOutGain(0.5, 0.4, 0.6))
 
 
 @pytest.mark.usefixtures("gains_half")
@@ -222,13 +222,13 @@ def law_of_effect(name, place):
 @pytest.mark.usefixtures("gains_half")
 @pytest.mark.parametrize("predicts", [True, False])
 def test_what_the_signal_itself_shows_keeps_its_name_unless_the_model_runs_away(monkeypatch, predicts):
-    monkeypatch.setattr(by_balance, "predicts_something", lambda *_: predicts)
+    monkeypatch.setattr(require_gain, "predicts_something", lambda *_: predicts)
     seen = searched_to("sensor_clipping")
     assert (unname_doubtful_effects(seen) is seen) == predicts
 
 
 def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
-    monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
+    monkeypatch.setattr(require_gain, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
     assert unname_doubtful_effects(searched_to("slew_limit")).unconfirmed == ()
 
 

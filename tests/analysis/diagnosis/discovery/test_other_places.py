@@ -18,10 +18,9 @@ from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, law_of_sum, laws_of
 from analysis.diagnosis.discovery.matched_filter import views_of
 from analysis.diagnosis.discovery.view_terms import reading_terms
-from analysis.diagnosis.document import Candidate, diagnosis_from_json
+from analysis.diagnosis.document import Candidate, diagnosis_from_json, found_law
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.found_law import found_law
 from analysis.diagnosis.result.candidates import beside_given
 from equalizer.effects.discovered_law import Channels, law_effect, law_parameters, law_values
 from equalizer.effects.effect import PlacedEffect
