@@ -15,7 +15,13 @@ from analysis.diagnosis.balance.blocks import Block
 from analysis.diagnosis.balance.judged_law import DRY_FRICTIONS, JudgedLaw, family_of, force_ratio, special_cases
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
-from analysis.diagnosis.balance.structures import Structure, StructureSearch, numbers_of, simplest_structure, values_of
+from analysis.diagnosis.balance.structures import (
+    Structure,
+    StructureSearch,
+    count_parameters,
+    simplest_structure,
+    values_of,
+)
 from analysis.diagnosis.data.correlated_residuals import agrees_with_folds, bootstrap_draws, gain_with_bound
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
@@ -227,7 +233,7 @@ def _indistinguishable_effects(
         if own.effect not in special_cases(effect):
             first &= behind[drawn].sum(axis=1) >= 0
         # Of two equally good laws, the plainer: a law of another kind with more parameters must have a smaller error.
-        more = numbers_of(regression, laws[-1:]) > numbers_of(regression, [number])
+        more = count_parameters(regression, laws[-1:]) > count_parameters(regression, [number])
         most = 0.0 if more and effect not in family_of(own.effect) else RIVAL_STAYS_BEHIND * gained
         if float(behind.sum()) <= most:
             alike.append((float(behind.sum()), effect))
@@ -242,7 +248,7 @@ def _why_not(
     if law.linear:
         return "a linear model of a higher order: part of the first model, no missing physics"
     if values is None:
-        return "its numbers have signs that such physics cannot have"
+        return "its parameters have signs that such physics cannot have"
     if low <= 0:
         return "its gain on held-out data is not larger than what varies between stretches"
     if share < LAW_OF_CEILING and gain < FURTHER_LAW_OF_ALL:

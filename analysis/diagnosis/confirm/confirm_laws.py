@@ -33,7 +33,7 @@ from analysis.diagnosis.confirm.laws_for_simulation import (
     constants_of,
     find_special_case,
     hypothesis_of_judged,
-    numbers_beside_laws,
+    parameters_beside_laws,
     refit_laws,
 )
 from analysis.diagnosis.confirm.require_gain import CONSTANT
@@ -141,12 +141,12 @@ def _from_starts(
     without: tuple[FittedCandidate, FittedCandidate],
     named: Sequence[tuple[int, JudgedLaw]],
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
-    """The fits after each law, and the last of them scored on all samples, started from the balance's linear numbers,
-    or, where these fail, from the model's own. without: the re-tuned model, and the model without new physics on all
-    samples.
+    """The fits after each law, and the last of them scored on all samples, started from the balance's linear
+    parameters, or, where these fail, from the model's own. without: the re-tuned model, and the model without new
+    physics on all samples.
     """
     retuned, plain = without
-    released = numbers_beside_laws(context.tuning, balances, [law.place for _, law in named])
+    released = parameters_beside_laws(context.tuning, balances, [law.place for _, law in named])
     steps = _steps(context, retuned, named, released)
     after = context.with_test_score(steps[-1])
     if np.any(released) and not _is_borne_out(plain, after):
@@ -202,13 +202,13 @@ def _all_of_some(flags: Sequence[bool]) -> bool:
 
 def leaves_open(result: SearchResult) -> bool:
     """Whether the interval of any positive parameter of a law reaches zero, such as a stiffness before sliding."""
-    return bool(_open_numbers(result))
+    return bool(_open_parameters(result))
 
 
 def open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
-    """Places of the named laws with such a number that their special case lacks."""
+    """Places of the named laws with such a parameter that their special case lacks."""
     hypothesis = result.found.steps[-1].fitted.hypothesis
-    found, begin, left_open = [], 0, set(_open_numbers(result))
+    found, begin, left_open = [], 0, set(_open_parameters(result))
     for place, claim in enumerate(hypothesis.claims):
         free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
         special = {parameter.name for name in claim.effect.simpler for parameter in EFFECTS[name].parameters}
@@ -219,8 +219,8 @@ def open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
     return tuple(found)
 
 
-def _open_numbers(result: SearchResult) -> list[int]:
-    """Positive numbers of the laws, in their order, whose intervals reach zero."""
+def _open_parameters(result: SearchResult) -> list[int]:
+    """Positive parameters of the laws, in their order, whose intervals reach zero."""
     assert result.errors is not None
     numbers = result.found.steps[-1].fitted.hypothesis.numbers
     errors = result.errors[len(result.context.tuning.names) :]

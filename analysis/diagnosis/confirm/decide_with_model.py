@@ -85,7 +85,7 @@ def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
         return f"on held-out data it takes {100 * min(whole.gain, last.gain):.0f} % of the error's power, not a third"
     if np.any(np.abs(found.after.fitted.deviations) >= AT_RETUNING_BOUND * RETUNING_BOUND):
-        return "beside it, a number of the model stands at the end of its tolerance"
+        return "beside it, a parameter of the model stands at the end of its tolerance"
     rival = _best_rival(context, result)
     if rival is not None and _not_better(context, rival, found.after):
         return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"

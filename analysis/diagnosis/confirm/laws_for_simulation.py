@@ -1,4 +1,4 @@
-"""Converts laws that a force balance named to hypotheses of a simulation, with starting numbers."""
+"""Converts laws that a force balance named to hypotheses of a simulation, with starting parameters."""
 
 import re
 from collections.abc import Sequence
@@ -58,8 +58,8 @@ def _with_values(judged: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
 def find_special_case(
     balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]], refining: tuple[int, JudgedLaw]
 ) -> tuple[int, JudgedLaw] | None:
-    """The law of the same axis that another one refines, still with that one's numbers; None where the balance does not
-    hold it, or it is named."""
+    """The law of the same axis that another one refines, still with that one's parameters; None where the balance does
+    not hold it, or it is named."""
     axis, judged = refining
     effect = EFFECTS.get(judged.law.effect)
     taken = {law.law.effect for of, law in named if of == axis}
@@ -103,7 +103,7 @@ def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> 
     )
 
 
-def numbers_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
+def parameters_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
     """Deviations of mass, damping and stiffness to their values beside the laws of the only balance; zeros
     otherwise."""
     start = np.zeros(len(tuning.names))

@@ -20,7 +20,7 @@ def list_fitting_measures(
     recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance], compared: Compared
 ) -> Iterator[FittingMeasure]:
     """The measures to try, the strictest first: a free simulation where the fitted model allows one; then forces along
-    the measured motion with the balance's linear numbers, in the band where noise is small, if it holds the laws'
+    the measured motion with the balance's linear parameters, in the band where noise is small, if it holds the laws'
     power, and in the band of the balance."""
     if not any(balance.named for balance in balances):
         return

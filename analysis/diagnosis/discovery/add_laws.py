@@ -52,12 +52,12 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
     is_open = len(checked.steps) < len(found.found.steps)
     fewer = _keep_rounds_of(found, checked) if is_open and _improves_held_out(checked) else None
     if fewer is not None:
-        # A law too weak for these recordings to fix its numbers takes no other law's name away.
+        # A law too weak for these recordings to fix its parameters takes no other law's name away.
         found, is_open = fewer, False
     rivals, judged = _rivals(context, known), judge(checked)
     reasons = (*_reasons_of_rivals(context, known, found, rivals), *_reasons_of_fit(found, checked))
     if is_open:
-        reasons = (*reasons, "these recordings leave its numbers as good as open")
+        reasons = (*reasons, "these recordings leave its parameters as good as open")
     if not judged.named:
         reasons = (*reasons, "what was kept for the test does not bear it out")
     if reasons:

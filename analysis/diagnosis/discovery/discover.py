@@ -78,7 +78,7 @@ def discover(
     time_left: TimeBudget,
     most: int = LAW_MOST_ROUNDS,
 ) -> Discovery | None:
-    """The laws found, at most `most`, fitted by output error; None where none is worth its numbers. known: what the
+    """The laws found, at most `most`, fitted by output error; None where none is worth its parameters. known: what the
     named effects explain."""
     context = replace(context, map_=limit_map(context.map_, time_left))
     retuned = known.retuned.fitted

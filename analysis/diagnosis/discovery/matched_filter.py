@@ -89,7 +89,7 @@ class FilteredRecord:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The filtered residual of one output, with what the model's own numbers would explain of it."""
+    """The filtered residual of one output, with what the model's own parameters would explain of it."""
 
     output: int
     acts_on: ActsOn
@@ -100,10 +100,10 @@ class View:
     residual: FloatArray
     """(s,), over all records and blocks."""
     parameter_columns: FloatArray
-    """(t + 1, s): what one standard deviation of each of the model's own numbers would explain of it, and a constant
+    """(t + 1, s): what one standard deviation of each of the model's own parameters would explain of it, and a constant
     force or reading."""
     pull: FloatArray
-    """(t + 1,): the calibration's values of these numbers less the present ones, in standard deviations."""
+    """(t + 1,): the calibration's values of these parameters less the present ones, in standard deviations."""
     edges: tuple[int, ...]
     """Edges of the blocks."""
     noise: float

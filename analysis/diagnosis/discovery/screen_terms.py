@@ -1,7 +1,7 @@
 """Screens terms by cross-validation: how much of a fit's residual each explains beside what re-tuning explains.
 
-Each block's error is that of numbers fitted to all others (Stone, J. R. Stat. Soc. B 36:111, 1974), with the model's
-own numbers pulled to their calibration, and within the bounds of re-tuning. Terms are tried together, as products of
+Each block's error is that of parameters fitted to all others (Stone, J. R. Stat. Soc. B 36:111, 1974), with the model's
+own parameters pulled to their calibration, and within the bounds of re-tuning. Terms are tried together, as products of
 columns.
 """
 
@@ -25,7 +25,7 @@ class Products:
 
     view: View
     held: tuple[FloatArray, ...]
-    """(s,) each: columns of terms already taken, after the model's numbers and a constant."""
+    """(s,) each: columns of terms already taken, after the model's parameters and a constant."""
     squares: FloatArray
     """(blocks, k, k)"""
     with_residual: FloatArray
@@ -55,7 +55,8 @@ class Products:
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
-        """(k,) each: bounds of the weights. The model's numbers stay within those of re-tuning: with mass, damping and
+        """(k,) each: bounds of the weights. The model's parameters stay within those of re-tuning: with mass, damping
+        and
         stiffness free to vanish, a force that takes the command away would explain everything."""
         tuned, k = len(self.view.pull) - 1, len(self.calibration)
         low, high = np.full(k, -np.inf), np.full(k, np.inf)
@@ -76,7 +77,7 @@ class Products:
 
 
 def products_of(view: View) -> Products:
-    """Products of the model's numbers and a constant."""
+    """Products of the model's parameters and a constant."""
     base, edges = view.parameter_columns, list(pairwise(view.edges))
     return Products(
         view,

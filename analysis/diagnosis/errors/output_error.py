@@ -43,7 +43,7 @@ LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """Sensitivity of the prediction to the model's own parameters, or to all numbers, on the samples to fit."""
+    """Sensitivity of the prediction to the model's own parameters, or to all parameters, on the samples to fit."""
 
     at: FloatArray
     """(t,): deviations (standard deviations of the calibration) at which it was computed."""
@@ -252,7 +252,7 @@ def _longest_s(measure: ErrorMeasure) -> float:
 def hypothesis_sensitivity(
     measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray, map_: object = map
 ) -> FloatArray:
-    """(numbers, samples): sensitivity of the prediction to the hypothesis's parameters."""
+    """(parameters, samples): sensitivity of the prediction to the hypothesis's parameters."""
     model: MechanicalModel = tuning.tune(from_.deviations)
     moves = [number.move for number in from_.hypothesis.numbers]
 

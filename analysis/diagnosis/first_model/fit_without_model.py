@@ -35,7 +35,7 @@ RIGID_REMARK = (
 )
 BALANCE_REMARK = (
     "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
-    "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
+    "measured motion; its parameters are left open by a tenth, and by half of what the named laws change in them."
 )
 UNTIMED_REMARK = (
     "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "

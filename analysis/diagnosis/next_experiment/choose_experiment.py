@@ -58,8 +58,8 @@ class PredictedGain:
 def predict_gains(
     bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, menu: Sequence[Experiment]
 ) -> tuple[PredictedGain, ...]:
-    """The experiments with their gains, in the menu's order. known: (t + numbers, t + numbers), information matrix of
-    the rival's numbers from what has been recorded, calibration included."""
+    """The experiments with their gains, in the menu's order. known: (t + parameters, t + parameters), information
+    matrix of the rival's parameters from what has been recorded, calibration included."""
     return tuple(PredictedGain(experiment, *_gains(bench, named, rival, known, experiment)) for experiment in menu)
 
 
@@ -165,7 +165,7 @@ def _squares_after_retuning(
     bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment, FloatArray, FloatArray]
 ) -> float:
     """Sum of squares that remains after the rival is re-tuned, by Gauss-Newton steps. seen: the experiment, the
-    difference to be tuned away, and the sensitivities to the rival's numbers."""
+    difference to be tuned away, and the sensitivities to the rival's parameters."""
     experiment, differs, moves = seen
     tuned, t = np.zeros(len(known)), len(rival.deviations)
     wanted = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + differs

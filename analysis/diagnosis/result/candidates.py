@@ -31,7 +31,7 @@ REFINING = {
     "drifting_force": ("constant_force",),
 }
 """Laws that are not simulated, and the special cases that each contains."""
-PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further numbers are open"
+PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further parameters are open"
 ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
 """With a single measured response, a late command and a late reading are equivalent."""

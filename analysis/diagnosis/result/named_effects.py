@@ -63,7 +63,7 @@ def labels_of(recording: Recording, model: MechanicalModel) -> Labels:
 
 
 def named_effects(found: Explanation, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
-    """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (numbers,), standard
+    """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (parameters,), standard
     errors of the hypothesis's point for its intervals (`interval_errors`)."""
     whole, named, first = found.after.fitted.hypothesis, [], 0
     shares = shares_taken(found.retuned, found.steps)
@@ -148,14 +148,14 @@ def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: t
 
 def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, labels: Labels) -> dict[str, Estimate]:
     claim = whole.claims[number]
-    at = reported_numbers(whole, number, whole.point)
+    at = reported_parameters(whole, number, whole.point)
     spread = {name: 0.0 for name in at}
     for coordinate in range(own.start, own.stop):
         if not np.isfinite(errors[coordinate]):
             continue
         moved = whole.point.copy()
         moved[coordinate] += errors[coordinate]
-        for name, value in reported_numbers(whole, number, moved).items():
+        for name, value in reported_parameters(whole, number, moved).items():
             spread[name] += (value - at[name]) ** 2
     units = _units(claim.effect, at, labels)
     return {
@@ -174,7 +174,7 @@ def _units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
 
 
 def law_of_claim(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:
-    """The discovered law of a claim, with its fitted numbers, as the document writes it; None for an effect of the
+    """The discovered law of a claim, with its fitted parameters, as the document writes it; None for an effect of the
     catalogue. axis: replaces that of the law."""
     law = whole.claims[number].effect.law
     if law is None:
@@ -188,7 +188,7 @@ def _interval(value: float, standard_error: float) -> tuple[float, float] | None
     return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
 
 
-def reported_numbers(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
+def reported_parameters(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
     """Parameters as the vocabulary defines them: of the first site, or of the largest for effects in `LARGEST`."""
     groups = _groups(whole, number, point)
     claim = whole.claims[number]

@@ -127,4 +127,4 @@ def _effect_of(item: object) -> str:
         return item.name
     hypothesis = item if isinstance(item, Hypothesis) else getattr(item, "hypothesis", None)
     claims = () if hypothesis is None else hypothesis.claims
-    return claims[-1].effect.name if claims else "the model's own numbers"
+    return claims[-1].effect.name if claims else "the model's own parameters"

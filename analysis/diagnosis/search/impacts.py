@@ -39,7 +39,7 @@ SIMULATIONS = 4
 WIDTHS = np.geomspace(0.02, 5.0, 13)
 """Gaps that are tried, over the estimated one."""
 FIRST_ROUNDS, ROUNDS, STEPS = 5, 4, 2
-"""Steps of the first fit, without the model's numbers; linearisations of the last fit; and its steps for each."""
+"""Steps of the first fit, without the model's parameters; linearisations of the last fit; and its steps for each."""
 GAINED = 0.02
 """Relative decrease of the cost that a further linearisation must promise."""
 RIVAL = "loose_joint"
@@ -91,7 +91,7 @@ def _is_model(trial: BandPowerFit) -> bool:
 
 
 def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
-    """The fit of the hypothesis's and the model's numbers together: play changes the sensitivity to the model's."""
+    """The fit of the hypothesis's and the model's parameters together: play changes the sensitivity to the model's."""
     view = _with_chance(view, start)
     best = evaluate_hypothesis(view, start.deviations, start.hypothesis)
     before = 0.0

@@ -31,7 +31,7 @@ class ReferenceRecording:
     base: Fitted
     """Re-tuned, without any effect."""
     known: Sensitivity
-    """Sensitivity to the model's numbers there."""
+    """Sensitivity to the model's parameters there."""
     evidence: Evidence
 
     def gain_on_clean(self, wanted: Hypothesis) -> FloatArray:
@@ -47,7 +47,7 @@ class ReferenceRecording:
         return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
 
     def costs_of(self, fixed: Hypothesis) -> tuple[float, float]:
-        """Cost without and with a hypothesis whose numbers are fixed, the model re-tuned as far in either."""
+        """Cost without and with a hypothesis whose parameters are fixed, the model re-tuned as far in either."""
         start = evaluate_fit(self.measure, self.tuning, self.base.deviations, fixed)
         without, with_it = (fit(self.measure, self.tuning, each, self.known, ROUNDS) for each in (self.base, start))
         return without.cost, with_it.cost
@@ -84,7 +84,7 @@ class ReferenceRecordings:
 
     def hold(self, hypothesis: Hypothesis, claim: int) -> bool:
         """Whether the recordings in order are predicted better with an effect as it was fitted elsewhere, all its
-        numbers included: then it did not come since. claim: which of the hypothesis's effects."""
+        parameters included: then it did not come since. claim: which of the hypothesis's effects."""
         effect = hypothesis.claims[claim].effect
         numbers = tuple(replace(parameter, fixed=True) for parameter in effect.parameters)
         held = replace(hypothesis.claims[claim], effect=replace(effect, parameters=numbers))

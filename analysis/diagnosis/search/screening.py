@@ -31,7 +31,7 @@ def screen(
     suggested: Sequence[Hypothesis],
     map_: Mapper,
 ) -> tuple[ScreenedHypothesis, ...]:
-    """The hypotheses with their predicted costs, the best first. known: sensitivity to the model's own numbers."""
+    """The hypotheses with their predicted costs, the best first. known: sensitivity to the model's own parameters."""
     model = tuning.tune(base.deviations)
     errors = residuals_to_fit(measure, base.residuals)
 

@@ -114,7 +114,7 @@ def _draw_pair(random: np.random.Generator) -> tuple[str, str]:
 def _axes(effects: tuple[str, ...], random: np.random.Generator) -> tuple[int, ...]:
     drawn, first = random.random(), int(random.integers(3))
     if "hand_impedance" in effects:
-        first = 0  # its numbers are those of x
+        first = 0  # its parameters are those of x
     if drawn > sum(SIZES) or any(name in ALL_AXES for name in effects):
         return (0, 1, 2)
     if drawn > SIZES[0]:

@@ -134,7 +134,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
         ) from refusal
     except np.linalg.LinAlgError as problem:
         raise not_diagnosable_error(
-            (f"The fits broke down ({problem}): near the given numbers the model runs away from what was recorded",),
+            (f"The fits broke down ({problem}): near the given parameters the model runs away from what was recorded",),
             "State narrower tolerances in the model, or give one that is nearer to the device.",
         ) from problem
     findings = replace(

@@ -1,4 +1,4 @@
-"""Where named laws are fitted from, and which of several is dropped because the data leave its numbers open."""
+"""Where named laws are fitted from, and which of several is dropped because the data leave its parameters open."""
 
 from types import SimpleNamespace
 
@@ -81,7 +81,7 @@ def result_of(*laws, errors=()):
         ((DRY,), (OPEN,), ()),
         ((BENT,), (SURE, 9.0 * OPEN, 4.0 * OPEN), ()),
     ],
-    ids=["all known", "no stiffness", "of the second", "nothing simpler", "signed numbers go elsewhere"],
+    ids=["all known", "no stiffness", "of the second", "nothing simpler", "signed parameters go elsewhere"],
 )
 def test_open_are_positive_numbers_that_the_special_case_lacks(laws, errors, open_ones):
     assert open_refinements(result_of(*laws, errors=errors), 1) == open_ones
@@ -121,7 +121,7 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
         return [ends_at(from_balance if np.any(deviations) else from_model)]
 
     monkeypatch.setattr(by_balance, "_steps", steps)
-    monkeypatch.setattr(by_balance, "numbers_beside_laws", lambda tuning, balances, laws: np.array([1.0, -2.0]))
+    monkeypatch.setattr(by_balance, "parameters_beside_laws", lambda tuning, balances, laws: np.array([1.0, -2.0]))
     context = SimpleNamespace(tuning=None, with_test_score=lambda candidate: candidate)
     _, after = _from_starts(context, (), (ends_at(8.0), ends_at(8.0)), ())
     assert after.score.test[0] == end

@@ -1,4 +1,4 @@
-"""The screen of terms: bounds of the model's own numbers, and slopes of a frequency over a long recording."""
+"""The screen of terms: bounds of the model's own parameters, and slopes of a frequency over a long recording."""
 
 from dataclasses import replace
 
