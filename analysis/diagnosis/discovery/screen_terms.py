@@ -42,25 +42,25 @@ class Products:
     def calibration(self) -> FloatArray:
         """(k,): prior precision of each column's weight."""
         sizes = self.squares.sum(axis=0).diagonal()
-        pulled = np.where(sizes > 0, 1e-10 * sizes, 1.0)
-        pulled[: len(self.view.pull) - 1] = 1.0
-        return pulled
+        precision = np.where(sizes > 0, 1e-10 * sizes, 1.0)
+        precision[: len(self.view.to_calibration) - 1] = 1.0
+        return precision
 
     @property
     def wanted(self) -> FloatArray:
         """(k,): the prior's part of the right side."""
-        pull = np.zeros(len(self.calibration))
-        pull[: len(self.view.pull)] = self.view.pull
-        return self.calibration * pull
+        offset = np.zeros(len(self.calibration))
+        offset[: len(self.view.to_calibration)] = self.view.to_calibration
+        return self.calibration * offset
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
         """(k,) each: bounds of the weights. The model's parameters stay within those of re-tuning: with mass, damping
-        and
-        stiffness free to vanish, a force that takes the command away would explain everything."""
-        tuned, k = len(self.view.pull) - 1, len(self.calibration)
+        and stiffness free to vanish, a force that takes the command away would explain everything."""
+        known, k = self.view.to_calibration, len(self.calibration)
+        tuned = len(known) - 1
         low, high = np.full(k, -np.inf), np.full(k, np.inf)
-        low[:tuned], high[:tuned] = self.view.pull[:tuned] - RETUNING_BOUND, self.view.pull[:tuned] + RETUNING_BOUND
+        low[:tuned], high[:tuned] = known[:tuned] - RETUNING_BOUND, known[:tuned] + RETUNING_BOUND
         return low, high
 
     def cross(self, columns: FloatArray) -> FloatArray:
@@ -123,14 +123,14 @@ def cross_validate_terms(of: Products, columns: FloatArray) -> TermErrors:
     without, with_it, factors = [], [], []
     for number in range(len(parts)):
         squares = of.squares.sum(axis=0) - of.squares[number] + np.diag(of.calibration)
-        pull = of.with_residual.sum(axis=0) - of.with_residual[number] + of.wanted
+        right_side = of.with_residual.sum(axis=0) - of.with_residual[number] + of.wanted
         other, size = cross.sum(axis=0) - cross[number], own.sum(axis=0) - own[number]
         bordered = _border(squares, other, size)
-        right = np.column_stack([np.tile(pull, (len(size), 1)), seen.sum(axis=0) - seen[number]])
+        right = np.column_stack([np.tile(right_side, (len(size), 1)), seen.sum(axis=0) - seen[number]])
         low, high = (np.append(bound, side) for bound, side in zip(of.limits, (-np.inf, np.inf), strict=True))
         solved = solve_within(bordered, right, low, high)
         weights, factor = solved[:, :-1].T, solved[:, -1]
-        alone = solve_within(squares[None], pull[None], *of.limits)[0]
+        alone = solve_within(squares[None], right_side[None], *of.limits)[0]
         without.append(_held_out_squares(of, number, alone[:, None])[0])
         with_it.append(
             _held_out_squares(of, number, weights)
@@ -194,6 +194,6 @@ def solve(of: Products) -> Solution:
     """Weights and cost of the base columns, fitted to all blocks together."""
     pulled, squares, seen = of.calibration, of.squares.sum(axis=0), of.with_residual.sum(axis=0)
     weights = solve_within((squares + np.diag(pulled))[None], (seen + of.wanted)[None], *of.limits)[0]
-    own = weights[: len(of.view.pull)] - of.view.pull
+    own = weights[: len(of.view.to_calibration)] - of.view.to_calibration
     left = float(of.power.sum() - 2 * seen @ weights + weights @ squares @ weights)
     return Solution(weights, left + float(pulled[: len(own)] @ own**2))

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.output_error import MOVED, Fitted, Sensitivity, residuals_to_fit, take_step
+from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted, Sensitivity, residuals_to_fit, take_step
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.noise.periods import settled_periods
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
@@ -87,7 +87,7 @@ def sensitivity_to_all(
 def _both_ways(hypothesis: Hypothesis, number: int, finer: float) -> tuple[float, float]:
     """Steps down and up within the bounds. number: of the hypothesis; below 0: of the model."""
     if number < 0:
-        return -finer * MOVED, finer * MOVED
+        return -finer * DIFFERENCE_STEP, finer * DIFFERENCE_STEP
     (low, high), at = hypothesis.numbers[number].bounds, hypothesis.point[number]
     step = finer * hypothesis.numbers[number].move
     return max(-step, low - at), min(step, high - at)

@@ -32,7 +32,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
-MOVED = 0.1
+DIFFERENCE_STEP = 0.1
 """Step of the finite differences, in standard deviations."""
 Dampings = Sequence[tuple[float, bool]]
 """Shares of the normal matrix's diagonal that are added, and whether the step is one of values (`move_point`)."""
@@ -119,7 +119,7 @@ def sensitivity(
     base = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.placed_effects()))
 
     def moved(number: int) -> FloatArray:
-        for move in (MOVED, -MOVED):
+        for move in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
             there = at.copy()
             there[number] += move
             try:

@@ -18,7 +18,7 @@ import numpy as np
 from analysis.diagnosis.data.recorded_conditions import add_mass
 from analysis.diagnosis.document import NextExperiment
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.output_error import MOVED, Fitted
+from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.next_experiment.experiment_menu import Experiment
 from analysis.diagnosis.settings import TELLING_GAIN
@@ -145,8 +145,9 @@ def _gains(
     columns = []
     for number in range(len(rival.deviations)):
         there = rival.deviations.copy()
-        there[number] += MOVED
-        columns.append((_simulate(bench, there, rival.hypothesis, rival.hypothesis.point, experiment) - base) / MOVED)
+        there[number] += DIFFERENCE_STEP
+        moved = _simulate(bench, there, rival.hypothesis, rival.hypothesis.point, experiment)
+        columns.append((moved - base) / DIFFERENCE_STEP)
     for number, of in enumerate(rival.hypothesis.numbers):
         point = rival.hypothesis.point.copy()
         point[number] += of.move

@@ -199,8 +199,8 @@ def open_effects(context: SearchContext, found: Explanation) -> Iterator[bool]:
 
 
 def _is_open(number: Number, at: float, error: float) -> bool:
-    """Whether the parameter's interval contains the value that means no effect. error: standard error of its
-    coordinate `at`."""
+    """Whether the parameter's interval contains the value that means no effect. error: standard error of its coordinate
+    `at`."""
     reach, away = _reach(number, at, error)
     value, none = number.value(at), number.parameter.none or 0.0
     return away <= _ABSENT * max(abs(value), abs(none)) or not reach <= away

@@ -108,10 +108,10 @@ def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
 def _with_chance(view: View, at: BandPowerFit) -> View:
     """The view with each band's chance variation between simulations, and averaging over as many."""
 
-    def course(number: int) -> FloatArray:
+    def predict(number: int) -> FloatArray:
         return view.predict(at.deviations, perturb(at.hypothesis, number))
 
-    spread = np.std(np.array(list(view.map_(course, range(SIMULATIONS)))), axis=0, ddof=1)
+    spread = np.std(np.array(list(view.map_(predict, range(SIMULATIONS)))), axis=0, ddof=1)
     return replace(view, spread=spread, ensemble=SIMULATIONS)
 
 
@@ -176,10 +176,10 @@ def _judge(
 def _comparison(context: SearchContext, best: BandPowerFit) -> _Comparison:
     power, model = BandPower(context.whole), context.tuning.tune(best.deviations)
 
-    def course(number: int) -> FloatArray:
+    def predict(number: int) -> FloatArray:
         return power.predict(context.whole.residuals(model, perturb(best.hypothesis, number).placed_effects()))
 
-    first, other = (np.asarray(each) for each in context.map_(course, range(2)))
+    first, other = (np.asarray(each) for each in context.map_(predict, range(2)))
     differ = power.misfits(first - other)
     chance = np.fmax(np.fmax(differ.fit, differ.choose), differ.test)
     return _Comparison(context, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))

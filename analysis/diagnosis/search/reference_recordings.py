@@ -4,11 +4,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.coloured_measure import ColouredMeasure
 from analysis.diagnosis.errors.fit_score import rms_over
 from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine, hypothesis_of_claim, without_claim
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, gather_evidence, sensitivity
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.errors.whitened_measure import WhitenedMeasure
 from analysis.diagnosis.search.starting_hypotheses import candidates
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.starts.evidence import Evidence
@@ -26,7 +26,7 @@ SETTLED = 1e-4
 class ReferenceRecording:
     """A clean recording with the model re-tuned to it, on which hypotheses are fitted for comparison."""
 
-    measure: ColouredMeasure
+    measure: WhitenedMeasure
     tuning: Tuning
     base: Fitted
     """Re-tuned, without any effect."""
@@ -94,7 +94,7 @@ class ReferenceRecordings:
 
 
 def reference_recording(
-    measure: ColouredMeasure, tuning: Tuning, deviations: FloatArray, map_: Mapper
+    measure: WhitenedMeasure, tuning: Tuning, deviations: FloatArray, map_: Mapper
 ) -> ReferenceRecording:
     """deviations: of the model re-tuned to it."""
     known = sensitivity(measure, tuning, deviations, NOTHING, map_)

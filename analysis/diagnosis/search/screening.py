@@ -46,16 +46,16 @@ def screen(
 
 
 def _predicted_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray) -> float:
-    with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
         strength = float(change @ change)
     if not (np.isfinite(strength) and strength > 0):
         return np.inf
     t = len(base.deviations)
     cross = known.on(change)
     products = np.block([[known.squares + np.eye(t), cross[:, None]], [cross[None, :], np.array([[strength]])]])
-    pull = np.concatenate([known.on(errors) - base.deviations, [float(change @ errors)]])
+    gradient = np.concatenate([known.on(errors) - base.deviations, [float(change @ errors)]])
     low = np.concatenate([-RETUNING_BOUND - base.deviations, [WEAKEST_START]])
     high = np.concatenate([RETUNING_BOUND - base.deviations, [STRONGEST_START]])
-    step = bounded_step(products, pull, low, high)
-    gain = 2 * float(step @ pull) - float(step @ products @ step)
+    step = bounded_step(products, gradient, low, high)
+    gain = 2 * float(step @ gradient) - float(step @ products @ step)
     return base.cost - gain / len(errors)
