@@ -98,7 +98,7 @@ def _diagnose_by_model(
 ) -> Findings:
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     if settings.fitted and is_too_short_to_name(recordings):
-        unsearched = SearchOutcome(_unsearched(recordings, fitting, settings, map_), CleanFloor())
+        unsearched = SearchOutcome(_evaluate_given_model(recordings, fitting, settings, map_), CleanFloor())
         return _assemble(recordings, settings, fitting, unsearched, balances)
     outcome = search_by_simulation(recordings, fitting, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
@@ -137,14 +137,14 @@ def _diagnose_beside_clean(
         unweighed = _search_beside_clean(recordings, model, settings, contrast.tested_effects, map_, progress)
         if unweighed is not None:
             return unweighed
-    found = _unsearched(recordings, fitting, settings, map_)
+    found = _evaluate_given_model(recordings, fitting, settings, map_)
     progress("writing down what was found", 0.95)
     floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
     whole = _assemble(recordings, settings, fitting, SearchOutcome(found, floor), ())
     return add_contrast(whole, contrast, recordings[0], FAULT_BEYOND)
 
 
-def _unsearched(
+def _evaluate_given_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchResult:
     """The model as it is given, with nothing named."""

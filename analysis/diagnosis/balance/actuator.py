@@ -148,7 +148,7 @@ def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str],
     law = min(best, key=lambda each: each[0])[1]
     alone, held = (turned.total_error(law, each) for each in ((), beside))
     rivals = [other for _, other in best if other is not law]
-    law = _scaled_to_command(law, search.regression)
+    law = _scale_to_command(law, search.regression)
     judged = _judge_law(turned, law, rivals, (beside, beside))
     as_little = alone <= held / (1 - COMMAND_RIVAL_LEAVES_MORE)
     return Actuator(law, judged, bool(beside) and as_little, suffices=as_little and alone <= plain)
@@ -197,13 +197,13 @@ def _in_place_of_motion(turned: InverseBalance, kinds: Kinds, named: tuple[int, 
     best = _best_of_each(turned, laws, ())
     law = min(best, key=lambda each: each[0])[1]
     rivals = [other for _, other in best if other is not law]
-    law = _scaled_to_command(law, turned.search.regression)
+    law = _scale_to_command(law, turned.search.regression)
     judged = _judge_law(turned, law, rivals, (named, ()))
     less = judged.gain >= COMMAND_LAW_LEAVES or len(named) > 1
     return Actuator(law, judged, True, True) if less and judged.gain_low > 0 else None
 
 
-def _scaled_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
+def _scale_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
     motions, own = regression.motions, regression.beside.own
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     return law.scaled_to(command, np.concatenate([motion.position[motion.fit, own] for motion in motions]))

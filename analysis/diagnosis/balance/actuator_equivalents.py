@@ -39,15 +39,15 @@ def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
     if not judged.named or judged.law.channel < 0:
         return judged
     if effect in SLIDING and not _reverses(regression, judged.law.channel):
-        return _doubted(judged, DEAD_BAND, BACKWARDS)
+        return _mark_alike(judged, DEAD_BAND, BACKWARDS)
     if effect == "quadratic_damping":
         has_friction = any(
             each.law.effect in SLIDING and each.law.channel == judged.law.channel for each in balance.named
         )
         if has_friction and not _reverses(regression, judged.law.channel):
-            return _doubted(judged, "force_nonlinearity", BACKWARDS)
+            return _mark_alike(judged, "force_nonlinearity", BACKWARDS)
     if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
-        return _doubted(judged, EQUIVALENT_LAWS[effect], "no inertia shows")
+        return _mark_alike(judged, EQUIVALENT_LAWS[effect], "no inertia shows")
     return judged
 
 
@@ -60,7 +60,7 @@ def _rests_within(regression: Regression) -> bool:
     return bool(np.mean(moves[force == 0.0]) < MOVES_MOST_OF_THE_TIME) if np.any(force == 0.0) else False
 
 
-def _doubted(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
+def _mark_alike(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
     alike = tuple(dict.fromkeys((twin, *judged.alike)))
     return replace(judged, alike=alike, why_not=f"these data cannot tell it from {twin}, for {why}")
 

@@ -217,17 +217,17 @@ def _clock_drift(channel: _Channel, late: float, runs_on: bool, parts: Sequence[
     """Readings taken at t (1 + late), resampled to t. runs_on: t counts from the begin of the file, else of each
     part."""
 
-    def taken(part: Part) -> FloatArray:
+    def read_times(part: Part) -> FloatArray:
         before = part.start if runs_on else 0
         return np.asarray((before + np.arange(len(part.response))) / (1 + late) - before)
 
     def undo(part: Part) -> Part:
-        at = taken(part)
+        at = read_times(part)
         undone = channel.of(lambda y, rate: resample(y, at))(part)
         return replace(undone, known=part.known & (at >= 0) & (at <= len(at) - 1))
 
     about = lambda size: _clock_drift(channel, size * late, runs_on, parts)  # noqa: E731
-    passed = noise_kept(np.concatenate([taken(part) for part in parts]))
+    passed = noise_kept(np.concatenate([read_times(part) for part in parts]))
     return Variant((undo,), proportional_parameter("ppm", 1e6 * late), *AROUND, passed=passed, about=about, exact=True)
 
 

@@ -64,8 +64,8 @@ def retuned_sentence(moved: Sequence[MovedParameter], fitted: bool = False) -> s
     more = len(moved) - _LISTED
     sentence = conjoin([*texts, f"{more} more"] if more > 0 else texts)
     if fitted:
-        moved = "these parameters of the first model moved by more than was left open at first"
-        return f"Fitted once more, {moved}: {sentence}."
+        beyond = "these parameters of the first model moved by more than was left open at first"
+        return f"Fitted once more, {beyond}: {sentence}."
     return f"Re-tuned beyond the calibration's standard deviation: {sentence}."
 
 

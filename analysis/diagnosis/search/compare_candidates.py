@@ -88,8 +88,8 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
     measure, tuning = context.measure, context.tuning
     if not any(has_motion_forces(law.hypothesis) for law in fits):
         return fits
-    if _left(context, fits[0]) <= NO_SECOND_START and any(_left(context, law) > REACHES_NOISE for law in fits):
-        near = [law for law in fits if _left(context, law) <= REACHES_NOISE]
+    if _error_of(context, fits[0]) <= NO_SECOND_START and any(_error_of(context, law) > REACHES_NOISE for law in fits):
+        near = [law for law in fits if _error_of(context, law) <= REACHES_NOISE]
         return sorted([*_polish(context, near), *(law for law in fits if law not in near)], key=lambda law: law.cost)
     for _ in range(MOST_POLISHED):
         try:
@@ -107,7 +107,7 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
     return fits
 
 
-def _left(context: SearchContext, law: Fitted) -> float:
+def _error_of(context: SearchContext, law: Fitted) -> float:
     """Error of the worst channel, times the noise."""
     return context.candidate(law).score.worst_channel
 

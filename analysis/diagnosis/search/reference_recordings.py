@@ -43,7 +43,7 @@ class ReferenceRecording:
         starts.sort(key=lambda fitted: fitted.cost)
         ends = [fit(measure, tuning, start, self.known, ROUNDS) for start in starts[:TRIED]]
         best = min([*ends, self.base], key=lambda fitted: fitted.cost)
-        without, with_it = self._left(self.base), self._left(best)
+        without, with_it = self._channel_rms(self.base), self._channel_rms(best)
         return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
 
     def costs_of(self, fixed: Hypothesis) -> tuple[float, float]:
@@ -59,7 +59,7 @@ class ReferenceRecording:
         held = without_claim(wanted, len(wanted.claims) - 1)
         return [wanted, *(combine(held, hypothesis) for hypothesis in own)]
 
-    def _left(self, fitted: Fitted) -> FloatArray:
+    def _channel_rms(self, fitted: Fitted) -> FloatArray:
         masks = [record.fit | record.choose for record in self.measure.records]
         return rms_over(self.measure.records, fitted.residuals, masks)
 

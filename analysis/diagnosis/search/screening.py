@@ -35,13 +35,13 @@ def screen(
     model = tuning.tune(base.deviations)
     errors = residuals_to_fit(measure, base.residuals)
 
-    def foreseen(hypothesis: Hypothesis) -> ScreenedHypothesis:
+    def predict(hypothesis: Hypothesis) -> ScreenedHypothesis:
         whole = combine(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
             there = residuals_to_fit(measure, measure.residuals(model, whole.placed_effects()))
         return ScreenedHypothesis(whole, _predicted_cost(base, known, errors, errors - there))
 
-    found: list[ScreenedHypothesis] = list(map_(foreseen, suggested))  # type: ignore[arg-type]
+    found: list[ScreenedHypothesis] = list(map_(predict, suggested))  # type: ignore[arg-type]
     return tuple(sorted(found, key=lambda screened: screened.cost))
 
 
