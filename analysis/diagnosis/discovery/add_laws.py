@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.discovery.discover import Discovery, Round, discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
-from analysis.diagnosis.discovery.proof import (
+from analysis.diagnosis.discovery.validation import (
     beats,
     choose_on_held_out,
     does_as_well_with_less,
@@ -31,7 +31,7 @@ from equalizer.laws.law import Law
 
 def add_laws(result: SearchResult, progress: Progress, time_left: TimeBudget) -> SearchResult:
     """The search with the discovered law in place of its names. Unchanged where it needs no law or none is better; a
-    law that fails a check of `proof` is added as an unconfirmed candidate only."""
+    law that fails a check of `validation` is added as an unconfirmed candidate only."""
     context, known = result.context, result.found
     if not _needs_law(result) or not time_left():
         return result
@@ -69,7 +69,7 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
 def _reasons_of_rivals(
     context: SearchContext, known: Explanation, found: Discovery, rivals: Sequence[FittedCandidate]
 ) -> Iterator[str]:
-    """Why the laws do not take the place of what the catalogue offers, and fail the checks of `proof`."""
+    """Why the laws do not take the place of what the catalogue offers, and fail the checks of `validation`."""
     if known.steps and may_stand_for_a_law(context, known):
         rivals = [rival for rival in rivals if not does_as_well_with_less(context, found, rival)]
     yield from reasons_against(context, found, rivals)
@@ -86,8 +86,8 @@ def _reasons_of_fit(found: Discovery, checked: Explanation) -> Iterator[str]:
 
 
 def _needs_law(result: SearchResult) -> bool:
-    """Whether a law may be searched for: only whole simulations prove one, and where noise alone remains, there is none
-    to be found, unless the names may stand for it."""
+    """Whether a law may be searched for: only whole simulations can confirm one, and where noise alone remains, there
+    is none to be found, unless the names may stand for it."""
     context, found = result.context, result.found
     if (
         context.measure.name != "free simulation"
