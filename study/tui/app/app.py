@@ -139,7 +139,7 @@ class HapteqApp(App[None]):
         self._panel(outcome, end.path)
 
     def _panel(self, outcome: Outcome, path: str) -> OutcomeScreen:
-        async def decided(decision: Decision | None) -> None:
+        async def act_on_decision(decision: Decision | None) -> None:
             match decision:
                 case "resume":
                     await self._begin_sitting(Resume(path, self._start.device, self._start.data))
@@ -151,7 +151,7 @@ class HapteqApp(App[None]):
                     self._leave_app(ExitCode.DONE)
 
         panel = OutcomeScreen(outcome)
-        self.push_screen(panel, decided)
+        self.push_screen(panel, act_on_decision)
         self._keys.forget_earlier()
         return panel
 
