@@ -56,13 +56,13 @@ def _without_gaps(recording: Recording) -> Recording:
     """Interpolated across missed ticks: a single one would cost a whole period."""
     if recording.position is None:
         raise NotMeasurableError("it has no position")
-    command, response = _filled(recording.command, "command"), _filled(recording.response, "response")
-    position = _filled(recording.position, "position")
-    excitation = None if recording.excitation is None else _filled(recording.excitation, "excitation")
+    command, response = _fill_missing(recording.command, "command"), _fill_missing(recording.response, "response")
+    position = _fill_missing(recording.position, "position")
+    excitation = None if recording.excitation is None else _fill_missing(recording.excitation, "excitation")
     return replace(recording, command=command, response=response, position=position, excitation=excitation)
 
 
-def _filled(signal: Signal, name: str) -> Signal:
+def _fill_missing(signal: Signal, name: str) -> Signal:
     missing = 1 - float(np.isfinite(signal.samples).all(axis=1).mean())
     if missing > MISSED_LIMIT:
         raise NotMeasurableError(f"{100 * missing:.1f} % of its {name} is missing, more than {100 * MISSED_LIMIT:g} %")

@@ -3,21 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.confirm.confirm_laws import (
-    leaves_open,
-    require_enough_gain,
-    search_by_balance,
-)
-from analysis.diagnosis.confirm.fitting_measures import (
-    FittingMeasure,
-    choose_fitting_measure,
-    choose_plain_forces,
-    list_fitting_measures,
-)
+from analysis.diagnosis.confirm.fitting_measures import FittingMeasure, choose_fitting_measure
+from analysis.diagnosis.confirm.require_gain import require_enough_gain
 from analysis.diagnosis.data.input_checks import is_too_short_to_name
 from analysis.diagnosis.data.observed_parts import names_of_parts
 from analysis.diagnosis.diagnosis_settings import BALANCE, DiagnosisSettings
@@ -41,6 +32,10 @@ from analysis.diagnosis.types import Mapper, Progress
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
+if TYPE_CHECKING:
+    from analysis.diagnosis.balance.judge_laws import Balance
+
+
 TOO_SHORT = "the recordings are so short that other laws would explain them as well"
 
 
@@ -60,18 +55,37 @@ def diagnose(
         balances = known if known is not None else _balances(recordings, settings, map_)
         if is_too_short_to_name(recordings):
             balances = tuple(balance.without_names(TOO_SHORT) for balance in balances)
-        for number, fitting in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
-            progress("fitting the named laws", 0.2 + 0.3 * number)
-            context = search_context_of(recordings[0], fitting, settings, map_)
-            repeats = all(floor.how == "repeats" for floor in fitting.chosen.floors)
-            weigh = partial(search_by_balance, context, balances, repeats)
-            found = settings.guard.part(BALANCE, "the fit of its laws", weigh, None)
-            if found is not None and not (fitting.narrow and leaves_open(found)):
-                return _assemble(recordings, settings, fitting, SearchOutcome(found, CleanFloor()), balances)
+        named = _diagnose_by_balance(recordings, model, settings, map_, progress, balances)
+        if named is not None:
+            return named
     progress("measuring the noise", 0.3 if balances else 0.0)
     if settings.clean:
         return _diagnose_beside_clean(recordings, model, settings, map_, progress)
     return _diagnose_by_model(recordings, model, settings, map_, progress, balances)
+
+
+def _diagnose_by_balance(
+    recordings: Sequence[Recording],
+    model: MechanicalModel,
+    settings: DiagnosisSettings,
+    map_: Mapper,
+    progress: Progress,
+    balances: "tuple[Balance, ...]",
+) -> Findings | None:
+    """Findings with the laws that the force balances name; None where they name none, or simulations confirm none."""
+    # Imported here, as below: a given model is searched by simulation.
+    from analysis.diagnosis.confirm.confirm_laws import leaves_open, search_by_balance
+    from analysis.diagnosis.confirm.measures_of_balances import list_fitting_measures
+
+    for number, fitting in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
+        progress("fitting the named laws", 0.2 + 0.3 * number)
+        context = search_context_of(recordings[0], fitting, settings, map_)
+        repeats = all(floor.how == "repeats" for floor in fitting.chosen.floors)
+        weigh = partial(search_by_balance, context, balances, repeats)
+        found = settings.guard.part(BALANCE, "the fit of its laws", weigh, None)
+        if found is not None and not (fitting.narrow and leaves_open(found)):
+            return _assemble(recordings, settings, fitting, SearchOutcome(found, CleanFloor()), balances)
+    return None
 
 
 def _diagnose_by_model(
@@ -80,13 +94,16 @@ def _diagnose_by_model(
     settings: DiagnosisSettings,
     map_: Mapper,
     progress: Progress,
-    balances: tuple[Balance, ...] = (),
+    balances: "tuple[Balance, ...]" = (),
 ) -> Findings:
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
-    if settings.fitted:
+    if settings.fitted and balances:
+        # Imported here, as above: only a model that was fitted has balances.
+        from analysis.diagnosis.confirm.measures_of_balances import choose_plain_forces
+
         fitting = choose_plain_forces(recordings, fitting, balances)
     if settings.fitted and is_too_short_to_name(recordings):
-        unsearched = SearchOutcome(_unsearched(recordings, fitting, settings, map_), CleanFloor())
+        unsearched = SearchOutcome(_evaluate_given_model(recordings, fitting, settings, map_), CleanFloor())
         return _assemble(recordings, settings, fitting, unsearched, balances)
     outcome = search_by_simulation(recordings, fitting, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
@@ -125,14 +142,14 @@ def _diagnose_beside_clean(
         unweighed = _search_beside_clean(recordings, model, settings, contrast.tested_effects, map_, progress)
         if unweighed is not None:
             return unweighed
-    found = _unsearched(recordings, fitting, settings, map_)
+    found = _evaluate_given_model(recordings, fitting, settings, map_)
     progress("writing down what was found", 0.95)
     floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
     whole = _assemble(recordings, settings, fitting, SearchOutcome(found, floor), ())
     return add_contrast(whole, contrast, recordings[0], FAULT_BEYOND)
 
 
-def _unsearched(
+def _evaluate_given_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchResult:
     """The model as it is given, with nothing named."""
@@ -166,7 +183,7 @@ def _search_beside_clean(
     return _assemble(recordings, settings, fitting, replace(outcome, result=result), ())
 
 
-def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper) -> tuple[Balance, ...]:
+def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper) -> "tuple[Balance, ...]":
     # Imported here: a given model has a balance of its own.
     from analysis.diagnosis.balance.balances import find_balances
 
@@ -176,13 +193,17 @@ def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_
 
 def _judge_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, outcome: SearchOutcome, settings: DiagnosisSettings
-) -> tuple[SearchOutcome, tuple[Balance, ...]]:
-    """The outcome after the decision by held-out gain, and the force balances with the model as their base."""
-    # Imported here: only where a model is given.
+) -> "tuple[SearchOutcome, tuple[Balance, ...]]":
+    """The outcome after the decision by held-out gain, and the force balances with the model as their base; unchanged
+    where nothing is left unexplained, or impacts were compared by band power."""
+    searched = outcome.result
+    if searched.judgement.verdict not in ("unexplained", "partly_explained") or searched.found.statistic is not None:
+        return outcome, ()
+    # Imported here: only where a model is given, and the search leaves something unexplained.
     from analysis.diagnosis.confirm.decide_with_model import ResultWithModel, decide_with_model
 
-    weigh = partial(decide_with_model, recordings, fitting, outcome.result, settings.time_left)
-    beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultWithModel(outcome.result))
+    weigh = partial(decide_with_model, recordings, fitting, searched, settings.time_left)
+    beside = settings.guard.part(BALANCE, "its weighing", weigh, ResultWithModel(searched))
     return replace(outcome, result=beside.result), beside.balances
 
 
@@ -191,7 +212,7 @@ def _assemble(
     settings: DiagnosisSettings,
     fitting: FittingMeasure,
     outcome: SearchOutcome,
-    balances: Sequence[Balance],
+    balances: "Sequence[Balance]",
 ) -> Findings:
     result, names = outcome.result, names_of_parts(recordings, settings.names)
     found = result.found if result.judgement.named else replace(result.found, after=result.found.retuned)

@@ -6,8 +6,8 @@ from dataclasses import replace
 from analysis.diagnosis.data.input_checks import require_alike, require_model_of
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.fit_without_model import first_model_of, fit_first_linear_model
-from analysis.diagnosis.first_model.model_from_balance import FirstModel
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.types import Mapper, Progress

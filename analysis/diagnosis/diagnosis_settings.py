@@ -1,14 +1,18 @@
 """Settings of a diagnosis: effects to consider, signals to compare, time limit."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.errors.choose_measure import Compared
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.time_budget import always
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.law_entry import LawEntry
 from equalizer.signals.recording import Recording
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.balance.judge_laws import Balance
+
 
 BALANCE = "the force balance"
 """Name of the force balance in a remark about its crash."""
@@ -26,7 +30,7 @@ class DiagnosisSettings:
     """Recordings of the device without the fault: its difference from the re-tuned model there is no mismatch."""
     fitted: bool = False
     """The model was fitted to these recordings by the program: laws are then tested in the force balance."""
-    balances: tuple[Balance, ...] | None = None
+    balances: "tuple[Balance, ...] | None" = None
     """`find_balances` of these recordings, where known already."""
     compared: Compared = "auto"
     """What is compared: motion, force, or what suits."""

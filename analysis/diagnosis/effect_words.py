@@ -232,7 +232,7 @@ _SEATS: Mapping[str, tuple[str, str]] = {
 }
 
 
-def numbers_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
+def parameters_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
     """ "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest"."""
     known = _find_words(effect)
     named = dict(known.numbers) if known else {}

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.found_segments import find_segments
 from analysis.diagnosis.data.input_checks import require_different, require_something
+from analysis.diagnosis.data.measured_motion import all_as_force_driven
 from analysis.diagnosis.data.observed_parts import LEAST_SAMPLES, parts_of
 from analysis.diagnosis.settings import BRIDGED, LEAST_KEPT
 from analysis.diagnosis.types import Mask

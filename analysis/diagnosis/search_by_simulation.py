@@ -2,18 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.confirm.confirm_laws import (
-    require_enough_gain,
-    unname_doubtful_effects,
-)
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
+from analysis.diagnosis.confirm.require_gain import require_enough_gain, unname_doubtful_effects
 from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
-from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
 from analysis.diagnosis.search.search import HUM, Beyond, SearchResult, has_law, hums_low, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
@@ -24,6 +20,10 @@ from equalizer.effects.law_entry import kept_effects
 from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
 from equalizer.signals.recording import Recording
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.balance.judge_laws import Balance
+
 
 TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
 """Laws of the command that a force balance tests: those that it does not name are absent."""
@@ -56,7 +56,7 @@ def search_by_simulation(
     settings: DiagnosisSettings,
     map_: Mapper,
     progress: Progress,
-    balances: Sequence[Balance],
+    balances: "Sequence[Balance]",
 ) -> SearchOutcome:
     """The result of the search by simulation. balances: where they name a law of the motion, nothing else is tried;
     where they name none, only effects of actuator and sensor are."""
@@ -81,17 +81,31 @@ def search_by_simulation(
     if balances and found.result.judgement.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
         found = replace(found, result=unname_doubtful_effects(require_enough_gain(found.result, repeats)))
+    return _explain_impacts(found, fitting, may_be_named, settings, progress)
+
+
+def _explain_impacts(
+    found: SearchOutcome,
+    fitting: FittingMeasure,
+    may_be_named: Sequence[Effect],
+    settings: DiagnosisSettings,
+    progress: Progress,
+) -> SearchOutcome:
+    """The outcome with play that rattles, compared by band power, where the search leaves something unexplained that
+    this explains; else unchanged."""
     result = found.result
     left = result.judgement.verdict in ("unexplained", "partly_explained") and not has_law(result)
-    if left and not result.context.certain and settings.time_left():
-        # Imported here: only a diagnosis that leaves something open looks for impacts.
-        from analysis.diagnosis.search.impacts import explain_impacts
+    if not left or result.context.certain or not settings.time_left():
+        return found
+    # Imported here: only a diagnosis that leaves something open looks for impacts.
+    from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
+    from analysis.diagnosis.search.impacts import explain_impacts
 
-        progress("looking for play that rattles", 0.9)
-        rattled = explain_impacts(result.context, result.found, chosen.floors, may_be_named)
-        if rattled is not None:
-            return replace(found, result=SearchResult(result.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
-    return found
+    progress("looking for play that rattles", 0.9)
+    rattled = explain_impacts(result.context, result.found, fitting.chosen.floors, may_be_named)
+    if rattled is None:
+        return found
+    return replace(found, result=SearchResult(result.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
 
 
 def _search_with_learned_error(

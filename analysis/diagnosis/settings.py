@@ -52,7 +52,7 @@ REST_S = 0.02  # within this time at the start; principle: an offset alone is no
 LAWS_WITHIN = 0.95  # of each named law's power that a band must hold for forces to be compared in it alone
 UNKNOWN_NOISE_SHARE = 1e-3  # of the signal, taken for noise where a recording cannot tell
 
-# How far the model's own numbers may move (`tuning`, `output_error`, `rigid_model`). By hand.
+# How far the model's own parameters may move (`tuning`, `output_error`, `rigid_model`). By hand.
 RETUNING_BOUND = 4.0  # standard deviations of the calibration
 UNSTATED_SHARE = 0.1  # one standard deviation of what has no stated tolerance, of the largest at any axis
 UNSTATED_MODES = 0.02  # the same of a mode's frequency
@@ -86,10 +86,10 @@ WORTH_FITTING = 0.2  # share of the best predicted gain that another candidate's
 MOST_REFINED = 3  # fits that are taken to the end
 WORTH_REFINING = 0.5  # share of the best one's gain that such a fit must have gained
 SAME_START = 0.01  # of what two starts of a law leave, that they may differ by to be one
-SHARED_MOTION = 0.05  # of an effect's gain, that two laws may differ by to share what the model's own numbers do
+SHARED_MOTION = 0.05  # of an effect's gain, that two laws may differ by to share what the model's own parameters do
 NO_SECOND_START = 1.08  # error up to which a fit needs no second start
 REACHES_NOISE = 2.0  # error after three steps up to which a fit is taken on where the best is noise alone already
-RICHER_LAW_SQUARES = 4.0  # squares of the noise, in sum, that more numbers must gain over a law that does the same
+RICHER_LAW_SQUARES = 4.0  # squares of the noise, in sum, that more parameters must gain over a law that does the same
 CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS = 6, 120  # of the response's middle frequency, at the recording's end
 CLOCK_LEAST_SHARE = 1e-3  # of the misfit that a trial of clock drift must take
 
@@ -167,7 +167,7 @@ TELLING_GAIN = 10.0  # log likelihood below which a proposed recording would lea
 # A law without a name (`discovery`). By hand, but where a principle is named.
 LAW_BLOCKS = 6  # least number of stretches that held-out errors are taken over
 LAW_POWER_KEPT = 0.999  # share of the commands' power within the band that laws are ranked in
-LAW_REFINED, LAW_BEAM = 6, 4  # starts whose free numbers are fitted; sums that are kept
+LAW_REFINED, LAW_BEAM = 6, 4  # starts whose free parameters are fitted; sums that are kept
 LAW_MOST_TERMS = 2  # along one axis at once; more are added round by round
 LAW_MAIN_PART = 0.3  # of the misfit that one term may leave; beyond, a sum is looked for
 LAW_ALMOST_NOISE = 1.1  # held-out error power along an axis, 1 = noise, below which no law is looked for
@@ -213,7 +213,7 @@ MOTION_OVERSAMPLED = 4.0  # samples that are kept per period of the band's end
 # periods of the band's end that are left out at either end of a part: there the filter reaches beyond the data
 MOTION_EDGE_PERIODS = 0.5
 BALANCE_FOLDS = 8  # blocks of the samples to fit, and as many of those to test by, at least
-# samples that numbers are fitted to at most, and as many to test by: the first ones of each block
+# samples that parameters are fitted to at most, and as many to test by: the first ones of each block
 BALANCE_MOST_SAMPLES = 20000
 
 # Which sums of laws are tried, and which is the plainest (`structures`, `simplest_structure`, `linear_part`). By hand.
@@ -266,7 +266,7 @@ DECAY_MOST_LEVELS = 6  # stretches of one decay
 # test blocks at least; with fewer, or where nothing moves in them, the held-out error is that of cross-validation
 # on the fit blocks
 LEAST_TEST_BLOCKS = 3
-FOUND_NUMBERS_OPEN = 0.1  # standard deviation of the numbers found at least, relative
+FOUND_NUMBERS_OPEN = 0.1  # standard deviation of the parameters found at least, relative
 RICHER_STRUCTURE_GAIN = 0.02  # share of the plainer structure's error power that a richer one must take
 RICHER_STRUCTURE_ERRORS = 2.0  # standard errors over the folds that the gain must exceed
 # singular values of standardised commands and motions, over the largest, below which they are rounding: a

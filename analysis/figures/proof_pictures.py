@@ -1,7 +1,7 @@
 """Figures of the blind test (`hapteq prove`): detection thresholds, detection by effect size, confusion, reliability.
 
-The outcomes are those of a bank of simulated devices with concealed effects. The *oracle* of the figures is an ideal
-observer that knows the effect: it compares the device with and without it, with no model to be re-tuned.
+The outcomes are those of a bank of simulated devices with concealed effects. The line of the figures is that of an
+ideal observer that knows the effect: it compares the device with and without it, with no model to be re-tuned.
 """
 
 from collections.abc import Sequence
@@ -42,8 +42,8 @@ def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
         for strength, how in strip.draws:
             marker, colour = MARKS[how]
             axes.plot(strength, row, marker, color=colour, markersize=6.5 if marker != "." else 5)
-        if strip.oracle is not None:
-            axes.vlines(strip.oracle, row - 0.38, row + 0.38, color=BLACK, linewidth=1.4)
+        if strip.ideal_threshold is not None:
+            axes.vlines(strip.ideal_threshold, row - 0.38, row + 0.38, color=BLACK, linewidth=1.4)
     axes.set_yticks(range(len(strips)), labels=[strip.effect.replace("_", " ") for strip in strips])
     axes.set_ylim(len(strips) - 0.4, -0.6)
     axes.set_xlim(-0.03, 1.03)

@@ -1,4 +1,4 @@
-"""Description of the method of a diagnosis, as text with its own numbers."""
+"""Description of the method of a diagnosis, with the figures of the diagnosis."""
 
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
@@ -69,12 +69,12 @@ def _choice_paragraphs(found: Findings) -> tuple[str, ...]:
     if not found.diagnosis.mismatch:
         return ()
     return (
-        "First the model's own numbers were re-tuned, each held by the stated standard deviation of its calibration "
+        "First the model's own parameters were re-tuned, each held by the stated standard deviation of its calibration "
         f"and moved by at most {RETUNING_BOUND:g} of them. Then every effect of the catalogue was tried wherever it "
         "could be, with starting values from what was still unexplained; the likeliest were fitted together with the "
-        "model's numbers, and the best was kept where it earned its place on data that it was not fitted to. The same "
-        f"was done for a further effect, at most three. A share of {100 * MODEL_FLOOR:g} % of each channel's signal "
-        "counts as noise, because no model is better than that.",
+        "model's parameters, and the best was kept where it earned its place on data that it was not fitted to. The "
+        f"same was done for a further effect, at most three. A share of {100 * MODEL_FLOOR:g} % of each channel's "
+        "signal counts as noise, because no model is better than that.",
     )
 
 

@@ -18,7 +18,7 @@ from analysis.diagnosis.result.wording import (
     device_of,
     effect_sentence,
     effect_title,
-    final_moved_numbers,
+    final_moved_parameters,
     inseparable_sentence,
     next_experiment_sentence,
     remainder_sentence,
@@ -176,11 +176,11 @@ _UNMOVED = {
 
 
 def _parameter_section(found: Findings) -> Section:
-    moved = final_moved_numbers(found)
+    moved = final_moved_parameters(found)
     text = retuned_sentence(moved, found.fitted) or _UNMOVED[found.fitted]
     table = retuned_table(found)
     return Section(
-        "The model's own numbers",
+        "The model's own parameters",
         paragraphs=(text,),
         points=doubtful_sentences(moved, found.fitted),
         tables=(table,) if table is not None else (),

@@ -5,9 +5,9 @@ from typing import Literal
 
 from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import estimate_text, noun_of, place_words
-from analysis.diagnosis.result.candidate_wording import candidate_numbers
+from analysis.diagnosis.result.candidate_wording import candidate_parameters
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.retuned_parameters import all_numbers
+from analysis.diagnosis.result.retuned_parameters import all_parameters
 from analysis.diagnosis.result.wording import device_of
 from analysis.diagnosis.unit_wording import error_text, probability_text, share_text, value_text
 from analysis.reports.page import Table
@@ -29,7 +29,7 @@ def parameter_table(effect: NamedEffect) -> Table:
         (name.replace("_", " "), estimate_text(parameter).partition(" [")[0], _interval_text(parameter))
         for name, parameter in effect.parameters.items()
     )
-    return Table("Its numbers", ("Number", "Value", "95 % interval"), rows)
+    return Table("Its parameters", ("Number", "Value", "95 % interval"), rows)
 
 
 def rival_table(effect: NamedEffect) -> Table:
@@ -54,7 +54,7 @@ def candidate_table(found: Findings) -> Table | None:
     rows = tuple(
         (
             f"{capitalise(noun_of(candidate.effect))} {place_words(candidate.place, candidate.axis, device.single)}",
-            candidate_numbers(candidate, device) or NONE,
+            candidate_parameters(candidate, device) or NONE,
             share_text(candidate.held_out_gain),
             share_text(candidate.share_of_black_box),
             end_sentence(capitalise(candidate.why_not)),
@@ -132,8 +132,8 @@ def retuned_table(found: Findings) -> Table | None:
     """All of them, folded."""
     if found.tuning is None:
         return None
-    alone = all_numbers(found.tuning, found.explanation.retuned.fitted.deviations)
-    final = all_numbers(found.tuning, found.explanation.after.fitted.deviations)
+    alone = all_parameters(found.tuning, found.explanation.retuned.fitted.deviations)
+    final = all_parameters(found.tuning, found.explanation.after.fitted.deviations)
     rows = tuple(
         (before.name, before.size, signed_number(before.deviations), after.size, signed_number(after.deviations))
         for before, after in zip(alone, final, strict=True)

@@ -1,4 +1,4 @@
-"""Report of a proof: misses first, then the figures with their intervals, then the method."""
+"""Report of a blind test: misses first, then the figures with their intervals, then the method."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ HOW = (
 
 @dataclass(frozen=True, slots=True)
 class ProofFacts:
-    """Facts of a proof beside its outcomes: seeds, seal, commit, engines, controls and further recordings."""
+    """Facts of a blind test beside its outcomes: seeds, seal, commit, engines, controls and further recordings."""
 
     seeds: str
     seal: str
@@ -56,7 +56,7 @@ def render_proof_report(
     )
     return render_page(
         Page(
-            title="Proof of the diagnosis on concealed physics",
+            title="Blind test of the diagnosis on concealed physics",
             summary=f"{len(outcomes)} devices were diagnosed blind; {len(score.misses)} answers are not as they should "
             "be. All of them are listed.",
             banner=" ".join(facts.remarks),

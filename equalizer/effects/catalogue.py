@@ -1,4 +1,4 @@
-"""All effects that a diagnosis can name and a simulation can play."""
+"""All effects that a diagnosis can name and a simulation can include."""
 
 from equalizer.effects import (
     added_mass,

@@ -22,10 +22,10 @@ SIGN_REVERSED: Mapping[str, tuple[str, ...]] = {
     "gravity_torque": ("angle",), "cogging": ("phase",), "end_stop": ("position", "side"),
     "pose_dependent_inertia": ("per_m",),
 }  # fmt: skip
-"""Effects that differ with the direction, and their numbers that change their sign."""
+"""Effects that differ with the direction, and their parameters that change their sign."""
 SWAPPED = {"asymmetric_friction": ("level_positive", "level_negative")}
 TILTED = {"extra_mode": ("tilt_next", "tilt_after_next")}
-"""Numbers that couple an axis to those after it."""
+"""Parameters that couple an axis to those after it."""
 
 
 def with_reversed_commands(

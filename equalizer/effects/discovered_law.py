@@ -11,10 +11,9 @@ import numpy as np
 from equalizer.effects.effect import Acts, AxisForce, Effect, OnCommand, OnResponse, Parameter, Values
 from equalizer.effects.simulation.law_kernel import PER_AXIS, law_force
 from equalizer.laws.evaluate import evaluate, evaluate_held
-from equalizer.laws.law import Law
+from equalizer.laws.law import Law, Role, roles
 from equalizer.laws.parse import FUNCTIONS, MEMORY
 from equalizer.laws.program import DEEPEST, program_of
-from equalizer.laws.roles import Role, roles
 from equalizer.laws.tree import Apply, Node, Variable, nodes
 from equalizer.laws.units import FORCE, NONE, SECOND, motion_dimension, units_of
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
@@ -98,7 +97,7 @@ def _is_free(name: str) -> bool:
 
 
 def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ...]:
-    """Units of the law's free numbers: those that it states, else those that dimensional analysis determines."""
+    """Units of the law's free parameters: those that it states, else those that dimensional analysis determines."""
     if law.units:
         return law.units
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity, 0)
@@ -113,17 +112,18 @@ def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ..
 
 
 def law_values(law: Law) -> Values:
-    """Values p0, p1, … of the law's effect: the law's free numbers in their order."""
+    """Values p0, p1, … of the law's effect: the law's free parameters in their order."""
     return {f"p{place}": number for place, number in enumerate(law.numbers)}
 
 
 def law_with_values(law: Law, values: Values) -> Law:
-    """The law with the values p0, p1, … as its free numbers; the inverse of `law_values`."""
+    """The law with the values p0, p1, … as its free parameters; the inverse of `law_values`."""
     return law.with_numbers([values[f"p{place}"] for place in range(len(law.numbers))])
 
 
 def law_parameters(law: Law) -> tuple[Parameter, ...]:
-    """Parameters p0, p1, … for a fit: range and scale follow from each number's role in the formula, and its sign."""
+    """Parameters p0, p1, … for a fit: range and scale follow from each parameter's role in the formula, and its
+    sign."""
     found = roles(law.tree)
     none = 0.0 if law.acts_on == "force" or _adds_to_signal(law.tree) else None
     return tuple(_parameter(f"p{place}", number, found[place], none) for place, number in enumerate(law.numbers))

@@ -19,8 +19,7 @@ from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
 from equalizer.laws.evaluate import evaluate
-from equalizer.laws.law import Law
-from equalizer.laws.roles import roles
+from equalizer.laws.law import Law, roles
 from equalizer.laws.tree import Apply, Node, Variable, format_formula
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -32,7 +31,7 @@ class LawEntry:
 
     name: str
     law: Law
-    """The law with its starting numbers, and the axis whose signals its formula calls by their letter."""
+    """The law with its starting parameters, and the axis whose signals its formula calls by their letter."""
     source: str
     signature: str
     """How the law shows in the data."""
@@ -81,7 +80,7 @@ def _rename_signals(node: Node, names: Mapping[str, str]) -> Node:
 
 def _make_starts(law: Law, site: int) -> Callable[[Evidence, int], tuple[Values, ...]]:
     """Starting values at one axis. For a force: its factors by linear regression on the missing force, the other
-    numbers as they were found."""
+    parameters as they were found."""
     factors = [place for place, role in roles(law.tree).items() if role == "factor"]
 
     def starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:

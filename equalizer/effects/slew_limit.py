@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
+from numba import njit, types
 
 from equalizer.effects.effect import ALL_SITES, Effect, OnCommand, Parameter, Values
-from equalizer.effects.simulation.slew_kernel import limit_rate
 from equalizer.effects.starts.command_starts import likeliest_value
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
@@ -14,6 +14,28 @@ SELDOM = (0.3, 0.5, 0.75)
 """Starting rates for a limit that is seldom reached, as shares of the command's fastest change."""
 ERRS = 1.05
 """Rms residual of a channel, over its noise, from which these starting values are tried."""
+
+
+_IN = types.Array(types.float64, 1, "A", readonly=True)
+
+
+@njit(types.void(_IN, types.float64, types.float64[::1], types.float64[::1]), cache=True, nogil=True)
+def limit_rate(commands: FloatArray, reach: float, mean: FloatArray, end: FloatArray) -> None:
+    """Fill mean (n,) and end (n,): the force over each step and at its end, for held commands (n,). reach: largest
+    change in one step."""
+    force = 0.0
+    for k in range(commands.shape[0]):
+        missing = commands[k] - force
+        if abs(missing) <= reach:
+            # Still ramping for a share of the step.
+            on_way = abs(missing) / reach
+            mean[k] = commands[k] - missing * on_way / 2
+            force = commands[k]
+        else:
+            change = reach if missing > 0 else -reach
+            mean[k] = force + change / 2
+            force += change
+        end[k] = force
 
 
 def limit_slew(

@@ -63,7 +63,7 @@ def fill_in(
             if found is not None:
                 image = readings[found]
                 for line in reversed(lines):
-                    image = _mirrored(image, line, float(azimuths[line]))
+                    image = _mirror_reading(image, line, float(azimuths[line]))
                 filled.append(image)
                 break
         else:
@@ -95,7 +95,7 @@ def _nearest(positions: FloatArray, wanted: FloatArray) -> int | None:
     return nearest if distances[nearest] < NEAR_M else None
 
 
-def _mirrored(reading: LinkageReading, line: int, azimuth_rad: float) -> LinkageReading:
+def _mirror_reading(reading: LinkageReading, line: int, azimuth_rad: float) -> LinkageReading:
     mirror = reflection(azimuth_rad)
     swapped = [line if joint == line else 3 - line - joint for joint in range(3)]
     upright = abs(np.cos(azimuth_rad)) < UPRIGHT

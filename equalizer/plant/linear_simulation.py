@@ -1,4 +1,4 @@
-"""Exact zero-order-hold discretisation of a mechanical model's linear part, by the matrix exponential."""
+"""A mechanical model's linear part: exact zero-order-hold discretisation by the matrix exponential, and its poles."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,3 +85,20 @@ def _output_rows(
     if order == 1:
         return np.hstack([nothing, output]), directly
     return output @ from_state, output @ inputs
+
+
+def free_motion_rates(model: MechanicalModel) -> ComplexArray:
+    """(2 coordinates,): eigenvalues of the model, 1/s; complex ones come in conjugate pairs."""
+    n = model.coordinates
+    motion = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n)],
+            [-np.linalg.solve(model.mass, model.stiffness), -np.linalg.solve(model.mass, model.damping)],
+        ]
+    )
+    return np.asarray(np.linalg.eigvals(motion), dtype=np.complex128)
+
+
+def growth_rate(model: MechanicalModel) -> float:
+    """Largest real part of the model's eigenvalues, 1/s; negative where all free motion decays."""
+    return float(free_motion_rates(model).real.max())

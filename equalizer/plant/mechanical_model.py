@@ -69,7 +69,7 @@ class ModelEffect:
     """Axis or channel name of the command or response; None where all share the effect."""
     parameters: Mapping[str, float]
     law: Law | None = None
-    """Formula of a discovered law, which contains its numbers."""
+    """Formula of a discovered law, which contains its parameters."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
@@ -96,7 +96,7 @@ class MechanicalModel(Summarised):
     rotational: bool = False
     provenance: Mapping[str, Any] = field(default_factory=dict)
     units: UnitSystem | None = None
-    """Units of its numbers where these are not SI (commands that are currents); None = SI, by `rotational`."""
+    """Units of its parameters where these are not SI (commands that are currents); None = SI, by `rotational`."""
 
     def __post_init__(self) -> None:
         for name in ("mass", "damping", "stiffness", "input", "output"):
@@ -138,8 +138,8 @@ class MechanicalModel(Summarised):
 def with_units_of(
     model: MechanicalModel, commands: Sequence[str], responses: Sequence[str], time: str = "s"
 ) -> MechanicalModel:
-    """The model with the units of its recordings: where its input and output matrices do not convert, its numbers are
-    in these units. commands, responses: units."""
+    """The model with the units of its recordings: where its input and output matrices do not convert, its parameters
+    are in these units. commands, responses: units."""
     plain = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
     found = system_of(commands, responses, time)
     if model.units is not None or not plain or found.rotational is not None:

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from protocols.definition.study_protocol import StudyProtocol
 
 REFERENCE_TO_HZ = 45.0
-"""The handle is seen to be free by lines from 30 Hz on: below this highest line there are too few."""
+"""Least highest line with a reference: lines from 30 Hz on show whether the handle is free, and several are needed."""
 
 PERIOD_S = 1.0
 """Period of a probe's multisine: its odd lines lie 2 Hz apart, and each of them drives a single axis."""
 
 FROM_HZ = 3.0
-"""Lowest line: below it the accelerometer sees next to nothing of forces that are hardly felt."""
+"""Lowest line: below it, forces that are hardly felt give accelerations below the sensor's noise."""
 
 LevelN = Annotated[float, Field(gt=0, le=1.5)]
 

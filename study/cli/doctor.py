@@ -111,7 +111,7 @@ def _prepare(device: str, calibrate: bool, daily: bool, moves: bool, hands_off: 
 def _accept(device: str, examination: "Examination", operator: str, hands_off: bool) -> None:
     from study.workflows.checks.examine_setup import accept
 
-    with _moving(hands_off) as moving:
+    with _show_motion(hands_off) as moving:
         sentence = accept(device, examination, operator, moving)
     typer.echo(sentence, err=True)
 
@@ -123,7 +123,7 @@ def _check_today(device: str, examination: "Examination", as_json: bool, hands_o
     from study.workflows.checks.examine_setup import require_sensor
 
     require_sensor(examination)
-    with _moving(hands_off) as moving:
+    with _show_motion(hands_off) as moving:
         checked = check_today(device, moving)
     if not as_json:
         typer.echo("Daily check")
@@ -135,7 +135,7 @@ def _check_today(device: str, examination: "Examination", as_json: bool, hands_o
 
 
 @contextmanager
-def _moving(hands_off: bool) -> "Iterator[MotionCallbacks]":
+def _show_motion(hands_off: bool) -> "Iterator[MotionCallbacks]":
     from functools import partial
 
     from study.cli.progress import late_bar

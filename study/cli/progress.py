@@ -49,10 +49,10 @@ def late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
     with ExitStack() as stack:
 
         @cache
-        def started() -> Callable[[float], None]:
+        def start_bar() -> Callable[[float], None]:
             return stack.enter_context(bar(title, total))
 
-        yield lambda done: started()(done)
+        yield lambda done: start_bar()(done)
 
 
 @contextmanager
@@ -63,12 +63,12 @@ def steps(title: str) -> Iterator[Callable[[str, float], None]]:
     with ExitStack() as stack:
 
         @cache
-        def started() -> tuple[Progress, TaskID]:
+        def start_bar() -> tuple[Progress, TaskID]:
             progress = stack.enter_context(Progress(*columns, console=Console(file=sys.stderr), disable=quiet))
             return progress, progress.add_task(title, total=1.0)
 
         def show(what: str, share: float) -> None:
-            progress, task = started()
+            progress, task = start_bar()
             progress.update(task, description=f"{title}: {what}", completed=share)
 
         yield show

@@ -35,11 +35,11 @@ def study_plan(
         typer.echo(json.dumps(document(studies), indent=2))
         return
     for number, study in enumerate(studies):
-        for line in (*[""] * (number > 0), *_shown(study, columns())):
+        for line in (*[""] * (number > 0), *_plan_lines(study, columns())):
             typer.echo(line)
 
 
-def _shown(study: "PlannedStudy", width: int | None) -> Iterator[str]:
+def _plan_lines(study: "PlannedStudy", width: int | None) -> Iterator[str]:
     from study.tui.text_rows import align_rows, wrap_hanging
     from study.workflows.views.plan_study import lines, order_words
 

@@ -40,9 +40,9 @@ def watch(
     elif once or as_json:
         _print_once(folder, as_json)
     elif plain or not (sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()):
-        _plain(folder)
+        _follow_in_lines(folder)
     else:
-        _screen(folder)
+        _show_screen(folder)
 
 
 def _folder(session: str, data: Path) -> Path:
@@ -65,7 +65,7 @@ def _last_changed(data: Path) -> str:
     return logs[-1].parent.name
 
 
-def _screen(folder: Path) -> None:
+def _show_screen(folder: Path) -> None:
     from study.store.sessions.request_inbox import RequestInbox
     from study.tui.engine.watch_feed import WatchFeed
     from study.tui.watch.watch_app import WatchApp
@@ -98,7 +98,7 @@ def _print_once(folder: Path, as_json: bool) -> None:
             typer.echo(text)
 
 
-def _plain(folder: Path) -> None:
+def _follow_in_lines(folder: Path) -> None:
     """Loop until the sitting is over."""
     from study.devices.clock import RealClock
     from study.session.watching.watch_view import ON

@@ -93,12 +93,12 @@ def header_notes(arrays: Arrays, wanted: ImportMap) -> tuple[str, ...]:
         if not array.ndim and name != rate and not _find_fault(array)  # it has a remark of its own
     ]
     left_out += [f"Left out: '{name}' is no column." for name in others]
-    peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_bracketed(channel.value))]
+    peaks = [f"'{channel.value}'" for channel in wanted.channel if is_peak_value(_text_in_brackets(channel.value))]
     joined += [f"Rms or peak values by their unit, kept as they are: {', '.join(peaks)}."] if peaks else []
     return (f"Taken from the header: {text}.", *joined, *left_out, *_direction_notes(table, wanted))
 
 
-def _bracketed(header: str) -> str:
+def _text_in_brackets(header: str) -> str:
     return header.partition("[")[2].removesuffix("]") or header.partition("(")[2].removesuffix(")")
 
 

@@ -42,10 +42,10 @@ class IntensityCue:
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         detection = WeibullCurve(self.detection_n, DETECTION_SLOPE)
         distance = detection.distance if felt.phase is Phase.DETECTION else self.d_prime
-        share_of_1 = NormalDist().cdf(sign * distance(felt.level_n) / 2 + self._roved(felt))
+        share_of_1 = NormalDist().cdf(sign * distance(felt.level_n) / 2 + self._rove_deviation(felt))
         return Reply(1 if luck < share_of_1 else 2, response_time_s(delay))
 
-    def _roved(self, felt: PerceivedStimulus) -> float:
+    def _rove_deviation(self, felt: PerceivedStimulus) -> float:
         """Felt strength beyond the memory, in standard deviations; a detection trial asks for no direction."""
         if felt.nominal_n is None or felt.phase is Phase.DETECTION:
             return 0.0

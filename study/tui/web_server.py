@@ -32,7 +32,11 @@ class ScreenServer(Server):
 
     def __init__(self, command: Sequence[str], host: str, port: int, say: Callable[[str], None]) -> None:
         super().__init__(
-            shlex.join(command), host=host, port=port, title="hapteq study", public_url=_address(_shown(host), port)
+            shlex.join(command),
+            host=host,
+            port=port,
+            title="hapteq study",
+            public_url=_address(_url_host(host), port),
         )
         self.console = Console(stderr=True)
         self._say = say
@@ -138,11 +142,11 @@ class ScreenServer(Server):
 
 def origins(host: str, port: int) -> frozenset[str]:
     """Origins of our page as a browser states them."""
-    names = THIS_MACHINE if _shown(host) in THIS_MACHINE else (_shown(host),)
+    names = THIS_MACHINE if _url_host(host) in THIS_MACHINE else (_url_host(host),)
     return frozenset(_address(name, port) for name in names)
 
 
-def _shown(host: str) -> str:
+def _url_host(host: str) -> str:
     """The host as an address contains it."""
     return f"[{host}]" if ":" in host else host
 

@@ -81,8 +81,8 @@ def test_a_diagnosis_begins_without_what_only_some_of_them_need():
     assert loaded.isdisjoint(needless), sorted(loaded & needless)
 
 
-CLOSURE_OF_DIAGNOSE = 224
-"""Our own files that are loaded before a diagnosis with a given model begins: 224 in November 2026, of which 47 are the
+CLOSURE_OF_DIAGNOSE = 200
+"""Our own files that are loaded before a diagnosis with a given model begins: 200 in November 2026, of which 47 are the
 catalogue of effects. The number may shrink only; what only some diagnoses need is imported where they need it."""
 OPTIONAL_ROOMS = (
     "analysis.diagnosis.contrast",  # only beside clean recordings
@@ -90,9 +90,13 @@ OPTIONAL_ROOMS = (
     "analysis.diagnosis.discovery",  # only where a model is given
     "analysis.diagnosis.first_model.fit_without_model",  # only without a given model
     "analysis.diagnosis.first_model.one_motion_per_force",
+    "analysis.diagnosis.first_model.model_from_balance",
     "analysis.diagnosis.errors.windows",  # only where the device drifts or its command is fed back
     "analysis.diagnosis.forces.force_views",  # only where forces are compared
-    "analysis.diagnosis.confirm.decide_with_model",  # only where a model is given
+    "analysis.diagnosis.balance",  # only without a given model, or where the search leaves something unexplained
+    "analysis.diagnosis.confirm.confirm_laws",  # only where a balance names laws
+    "analysis.diagnosis.confirm.measures_of_balances",
+    "analysis.diagnosis.confirm.decide_with_model",  # only where a search with a given model leaves something open
     "analysis.diagnosis.data.force_constant",  # only where commands are currents
     "analysis.diagnosis.search.impacts",  # only where the search leaves something open
     "analysis.diagnosis.next_experiment",  # only where an effect is named

@@ -30,12 +30,13 @@ from analysis.diagnosis.balance.command_laws import (
 )
 from analysis.diagnosis.balance.inverse_balance import InverseBalance
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
-from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw, bootstrap_draws, gain_with_bound
+from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.linear_part import search_beside_linear
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, StructureSearch
+from analysis.diagnosis.data.correlated_residuals import bootstrap_draws, gain_with_bound
 from analysis.diagnosis.settings import (
     COMMAND_LAW_LEAVES,
     COMMAND_RIVAL_LEAVES_MORE,
@@ -147,7 +148,7 @@ def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str],
     law = min(best, key=lambda each: each[0])[1]
     alone, held = (turned.total_error(law, each) for each in ((), beside))
     rivals = [other for _, other in best if other is not law]
-    law = _scaled_to_command(law, search.regression)
+    law = _scale_to_command(law, search.regression)
     judged = _judge_law(turned, law, rivals, (beside, beside))
     as_little = alone <= held / (1 - COMMAND_RIVAL_LEAVES_MORE)
     return Actuator(law, judged, bool(beside) and as_little, suffices=as_little and alone <= plain)
@@ -196,13 +197,13 @@ def _in_place_of_motion(turned: InverseBalance, kinds: Kinds, named: tuple[int, 
     best = _best_of_each(turned, laws, ())
     law = min(best, key=lambda each: each[0])[1]
     rivals = [other for _, other in best if other is not law]
-    law = _scaled_to_command(law, turned.search.regression)
+    law = _scale_to_command(law, turned.search.regression)
     judged = _judge_law(turned, law, rivals, (named, ()))
     less = judged.gain >= COMMAND_LAW_LEAVES or len(named) > 1
     return Actuator(law, judged, True, True) if less and judged.gain_low > 0 else None
 
 
-def _scaled_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
+def _scale_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
     motions, own = regression.motions, regression.beside.own
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
     return law.scaled_to(command, np.concatenate([motion.position[motion.fit, own] for motion in motions]))
@@ -278,7 +279,7 @@ def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -
             f"in the command's place it takes {100 * max(gain, 0.0):.0f} % of what laws of the motion leave, not most"
         )
     # A curve of the command and a force that changes with the distance are different physics.
-    strange = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.pull is not None]
+    strange = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
     if strange or len(alike) >= LARGEST_CLASS:
         return f"these data cannot tell it from {', '.join(alike)}"
     return "" if law.effect in EFFECTS_BY_NAME or law.formula else "no simulation of ours plays it yet"

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
+from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, Structure, is_better
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
@@ -25,8 +25,8 @@ def doubt_laws_of_actuator(balance: Balance) -> Balance:
     """The balance of a driven axis, with the names removed from laws that may as well be its actuator's. Without a law
     of the command, laws found behind it are not named either."""
     laws = tuple(_doubt_law(each, balance) for each in balance.laws)
-    through = [each.law.effect for each in balance.named if each.place == NO_COLUMN]
-    if through and not any(each.named and each.place == NO_COLUMN for each in laws):
+    through = [each.law.effect for each in balance.named if not each.has_column]
+    if through and not any(each.named and not each.has_column for each in laws):
         why = f"it was found behind {through[0]}, which these data leave in doubt"
         laws = tuple(replace(each, why_not=each.why_not or why) for each in laws)
     return replace(balance, laws=laws)
@@ -34,20 +34,20 @@ def doubt_laws_of_actuator(balance: Balance) -> Balance:
 
 def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
     regression, effect = balance.search.regression, judged.law.effect
-    if judged.named and effect == DEAD_BAND and judged.place == NO_COLUMN and _rests_within(regression):
+    if judged.named and effect == DEAD_BAND and not judged.has_column and _rests_within(regression):
         return replace(judged, alike=tuple(dict.fromkeys((*judged.alike, EQUIVALENT_LAWS[DEAD_BAND]))))
     if not judged.named or judged.law.channel < 0:
         return judged
     if effect in SLIDING and not _reverses(regression, judged.law.channel):
-        return _doubted(judged, DEAD_BAND, BACKWARDS)
+        return _mark_alike(judged, DEAD_BAND, BACKWARDS)
     if effect == "quadratic_damping":
         has_friction = any(
             each.law.effect in SLIDING and each.law.channel == judged.law.channel for each in balance.named
         )
         if has_friction and not _reverses(regression, judged.law.channel):
-            return _doubted(judged, "force_nonlinearity", BACKWARDS)
+            return _mark_alike(judged, "force_nonlinearity", BACKWARDS)
     if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
-        return _doubted(judged, EQUIVALENT_LAWS[effect], "no inertia shows")
+        return _mark_alike(judged, EQUIVALENT_LAWS[effect], "no inertia shows")
     return judged
 
 
@@ -60,7 +60,7 @@ def _rests_within(regression: Regression) -> bool:
     return bool(np.mean(moves[force == 0.0]) < MOVES_MOST_OF_THE_TIME) if np.any(force == 0.0) else False
 
 
-def _doubted(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
+def _mark_alike(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
     alike = tuple(dict.fromkeys((twin, *judged.alike)))
     return replace(judged, alike=alike, why_not=f"these data cannot tell it from {twin}, for {why}")
 

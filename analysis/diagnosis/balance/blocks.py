@@ -42,7 +42,7 @@ def column_scale(rows: Sequence[FloatArray], fit: Sequence[Mask]) -> FloatArray:
 
 
 def blocks_of(
-    rows: Sequence[FloatArray], aims: Sequence[FloatArray], masks: Sequence[Mask], units: tuple[FloatArray, float]
+    rows: Sequence[FloatArray], forces: Sequence[FloatArray], masks: Sequence[Mask], units: tuple[FloatArray, float]
 ) -> tuple[Block, ...]:
     """Blocks of the masked samples, about twice `BALANCE_FOLDS` in all, from columns divided by their scales. units:
     scales (k,), and the mean about which `Block.signal` is taken. Of more than `BALANCE_MOST_SAMPLES` samples, only the
@@ -51,12 +51,12 @@ def blocks_of(
     total = sum(int(mask.sum()) for mask in masks)
     found = []
     share = min(1.0, BALANCE_MOST_SAMPLES / max(total, 1))
-    for number, (columns, aim, mask) in enumerate(zip(rows, aims, masks, strict=True)):
+    for number, (columns, force, mask) in enumerate(zip(rows, forces, masks, strict=True)):
         places = np.flatnonzero(mask)
         count = int(np.clip(round(2 * BALANCE_FOLDS * len(places) / max(total, 1)), 1, len(places) or 1))
         for whole in np.array_split(places, count) if len(places) else []:
             part = whole[: max(int(share * len(whole)), 1)]
-            x, y = columns[part] / scale, aim[part]
+            x, y = columns[part] / scale, force[part]
             found.append(Block(x.T @ x, x.T @ y, float(y @ y), float(np.sum((y - mean) ** 2)), number, part))
     return tuple(found)
 

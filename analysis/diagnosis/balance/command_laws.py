@@ -48,7 +48,7 @@ class CommandLaw:
     columns: Callable[[FloatArray, dict[str, float]], FloatArray]
     """Columns (n, weights) of a command (n,): their weighted sum is the force; a single column is the force up to a
     gain."""
-    pull: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
+    factor_at: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
     """(n,): factor of the force at each position; None = it does not depend on the position."""
     flexible: bool = False
     """Whether it has more freedom than the other laws, and counts only with a clearly smaller error."""
@@ -64,7 +64,7 @@ class CommandLaw:
     def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
         """command, position: (n,) each."""
         columns = self.scale * self.columns(command, self.values)
-        return columns if self.pull is None else columns * self.pull(position, self.values)[:, None]
+        return columns if self.factor_at is None else columns * self.factor_at(position, self.values)[:, None]
 
     def scaled_to(self, command: FloatArray, position: FloatArray) -> "CommandLaw":
         """The law with its force as large as the command (least squares), where it has a formula: masses keep their
@@ -126,11 +126,11 @@ def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
     for side, end in ((1.0, low), (-1.0, high)):
         for gap in GAPS:
             for columns in (_force_of_square, AS_COMMANDED.columns):
-                pull = partial(_pull_at, side, end)
-                yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, pull, True)
+                factor_at = partial(_attraction_at, side, end)
+                yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, factor_at, True)
 
 
-def _pull_at(side: float, end: float, position: FloatArray, of: dict[str, float]) -> FloatArray:
+def _attraction_at(side: float, end: float, position: FloatArray, of: dict[str, float]) -> FloatArray:
     """side: 1 where the position is a distance that grows, from `end` on; -1 where it falls."""
     return np.asarray((of["gap"] + np.maximum(side * (position - end), 0.0)) ** -2)
 

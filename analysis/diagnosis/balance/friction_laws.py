@@ -17,7 +17,7 @@ from analysis.diagnosis.balance.law import (
 )
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.effects.simulation.along_motion import RESTS
-from equalizer.effects.simulation.bristle_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 SHARP = RESTS

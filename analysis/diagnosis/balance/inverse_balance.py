@@ -99,14 +99,14 @@ class InverseBalance:
         aims = [columns[:, solved] for columns in regression.columns]
         fit, test = (
             [motion.valid_samples(mask & moves) for motion, mask, moves in zip(motions, masks, moving, strict=True)]
-            for moving in [self._moving()]
+            for moving in [self._find_moving_samples()]
             for masks in ([m.fit for m in motions], [m.test for m in motions])
         )
         mean = float(np.concatenate([aim[mask] for aim, mask in zip(aims, fit, strict=True)]).mean())
         units = column_scale(rows, fit), mean
         return blocks_of(rows, aims, fit, units), blocks_of(rows, aims, test, units) if tested else ()
 
-    def _moving(self) -> list[Mask]:
+    def _find_moving_samples(self) -> list[Mask]:
         """(n,) per motion: samples that are evidence."""
         regression = self.search.regression
         speeds = [motion.velocity[:, regression.beside.own] for motion in regression.motions]

@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.blocks import Block
-from analysis.diagnosis.balance.judged_law import (
-    JudgedLaw,
-    agrees_with_folds,
-    bootstrap_draws,
-    force_ratio,
-    gain_with_bound,
-    special_cases,
-)
+from analysis.diagnosis.balance.judged_law import DRY_FRICTIONS, JudgedLaw, family_of, force_ratio, special_cases
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.regression import Regression, fit_all_laws
-from analysis.diagnosis.balance.structures import Structure, StructureSearch, numbers_of, simplest_structure, values_of
+from analysis.diagnosis.balance.structures import (
+    Structure,
+    StructureSearch,
+    count_parameters,
+    simplest_structure,
+    values_of,
+)
+from analysis.diagnosis.data.correlated_residuals import agrees_with_folds, bootstrap_draws, gain_with_bound
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
     FURTHER_LAW_GAIN,
@@ -42,15 +42,6 @@ from equalizer.signals.signal import FloatArray
 
 MENDS_SHAPE = "it acts like a named law, and may only mend its shape"
 NOT_ALONE = ("its gain is too small to be named", "it gains too unevenly from stretch to stretch")
-DRY_FRICTIONS = {
-    "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
-    "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
-}  # fmt: skip
-FAMILIES = (
-    DRY_FRICTIONS | {"quadratic_damping"},
-    {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
-)  # fmt: skip
-"""Effects that may form a class, because they act alike. Of different families, nothing is named."""
 BY_CONDITION = {"condition_dependent_friction", "condition_dependent_damping"}
 """Laws of one condition that may form a class, although other friction acts differently."""
 PLAYED_AS = {"drifting_friction": "coulomb_friction"}
@@ -80,6 +71,11 @@ class Balance:
     @property
     def named(self) -> tuple[JudgedLaw, ...]:
         return tuple(each for each in self.laws if each.named)
+
+    @property
+    def linear_laws(self) -> tuple[Law, ...]:
+        """Linear laws beside mass, damping and stiffness, of the base and of the chosen structure."""
+        return (*self.search.regression.beside.laws, *(each.law for each in self.laws if each.law.linear))
 
     def without_names(self, why_not: str) -> "Balance":
         """The balance with its named laws left as candidates."""
@@ -136,10 +132,6 @@ def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
         mates = [other for other in found if other.named and family_of(other.law.effect) & {law.law.effect}]
         found.append(replace(law, why_not=MENDS_SHAPE) if law.named and mates and law.gain < SECOND_OF_FAMILY else law)
     return tuple(found)
-
-
-def family_of(effect: str) -> set[str]:
-    return next((family for family in FAMILIES if effect in family), {effect})
 
 
 def blocks_to_judge(regression: Regression) -> tuple[Block, ...]:
@@ -241,7 +233,7 @@ def _indistinguishable_effects(
         if own.effect not in special_cases(effect):
             first &= behind[drawn].sum(axis=1) >= 0
         # Of two equally good laws, the plainer: a law of another kind with more parameters must have a smaller error.
-        more = numbers_of(regression, laws[-1:]) > numbers_of(regression, [number])
+        more = count_parameters(regression, laws[-1:]) > count_parameters(regression, [number])
         most = 0.0 if more and effect not in family_of(own.effect) else RIVAL_STAYS_BEHIND * gained
         if float(behind.sum()) <= most:
             alike.append((float(behind.sum()), effect))
@@ -256,7 +248,7 @@ def _why_not(
     if law.linear:
         return "a linear model of a higher order: part of the first model, no missing physics"
     if values is None:
-        return "its numbers have signs that such physics cannot have"
+        return "its parameters have signs that such physics cannot have"
     if low <= 0:
         return "its gain on held-out data is not larger than what varies between stretches"
     if share < LAW_OF_CEILING and gain < FURTHER_LAW_OF_ALL:

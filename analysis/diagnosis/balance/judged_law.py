@@ -4,17 +4,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from analysis.diagnosis.balance.law import Formula, Law
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.settings import BOOTSTRAP_DRAWS, BOOTSTRAP_LEVEL, BOOTSTRAP_SEED
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
-from equalizer.signals.signal import FloatArray
 
 NO_COLUMN = -1
 """Index in a regression of a law that changes the force itself."""
+DRY_FRICTIONS = {
+    "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
+    "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
+}  # fmt: skip
+FAMILIES = (
+    DRY_FRICTIONS | {"quadratic_damping"},
+    {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
+)  # fmt: skip
+"""Effects that may form a class, because they act alike. Of different families, nothing is named."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,27 +59,13 @@ class JudgedLaw:
         return self.law.effect if self.formula is None else DISCOVERED_LAW
 
     @property
+    def has_column(self) -> bool:
+        """Whether it is a term of the regression, not a change of the force itself."""
+        return self.place != NO_COLUMN
+
+    @property
     def named(self) -> bool:
         return not self.why_not
-
-
-def gain_with_bound(without: FloatArray, with_it: FloatArray) -> tuple[float, float]:
-    """Share of the error power that a law takes, and its lower bound by bootstrap over blocks. Inputs: (blocks,)."""
-    drawn = bootstrap_draws(len(without))
-    shares = 1 - with_it[drawn].sum(axis=1) / np.maximum(without[drawn].sum(axis=1), 1e-300)
-    return float(1 - with_it.sum() / max(float(without.sum()), 1e-300)), float(np.quantile(shares, BOOTSTRAP_LEVEL))
-
-
-def agrees_with_folds(held: Sequence[FloatArray], folds: Sequence[FloatArray]) -> bool:
-    """Whether a law has a gain on the held-out blocks, and a significant one on these and the folds together. Each:
-    errors without the law, and with it, (blocks,)."""
-    _, low = gain_with_bound(*(np.concatenate(each) for each in zip(held, folds, strict=True)))
-    return low > 0 and gain_with_bound(*held)[0] > 0
-
-
-def bootstrap_draws(blocks: int) -> npt.NDArray[np.int64]:
-    """(`BOOTSTRAP_DRAWS`, blocks): indices of blocks drawn with replacement, always the same for a number of blocks."""
-    return np.random.default_rng(BOOTSTRAP_SEED).integers(blocks, size=(BOOTSTRAP_DRAWS, blocks))
 
 
 def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> float:
@@ -90,3 +82,7 @@ def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> flo
 def special_cases(effect: str) -> tuple[str, ...]:
     """Effects that a law contains as special cases: it always fits better than these."""
     return EFFECTS[effect].simpler if effect in EFFECTS else ()
+
+
+def family_of(effect: str) -> set[str]:
+    return next((family for family in FAMILIES if effect in family), {effect})

@@ -15,8 +15,8 @@ Numbers = tuple[float, ...]
 Columns = Callable[[Motion, Numbers], FloatArray]
 """(n, weights)"""
 Values = Callable[[FloatArray, Numbers, float], dict[str, float] | None]
-"""Maps weights (weights,), nonlinear numbers and the moving mass to the effect's parameters; None where the signs are
-not physical."""
+"""Maps weights (weights,), nonlinear parameters and the moving mass to the effect's parameters; None where the signs
+are not physical."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from analysis.diagnosis.balance.structures import (
     Structure,
     StructureSearch,
     is_better,
-    refine_numbers,
+    refine_parameters,
     search_structures,
     simplest_structure,
     values_of,
@@ -130,7 +130,7 @@ def _add_linear_law(room: Regression, chosen: Structure) -> tuple[Regression, St
             best = tried
     if best is None or not _is_worth_it(chosen, best):
         return None
-    room = refine_numbers(room, [best])
+    room = refine_parameters(room, [best])
     return room, Structure(best.laws, room.cross_validated_errors(room.columns_of(best.laws)))
 
 

@@ -25,7 +25,7 @@ class GivenBase:
     """A given model's columns along one axis, in place of free mass, damping and stiffness."""
 
     columns: tuple[FloatArray, ...]
-    """Per motion, (n, 1 + numbers): the force that the model needs along the measured motion, and its change per
+    """Per motion, (n, 1 + parameters): the force that the model needs along the measured motion, and its change per
     standard deviation of each free parameter; at the recording's rate."""
     mass: float
     """Mass that moves along the axis, kg (kg m^2)."""

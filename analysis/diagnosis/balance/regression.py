@@ -3,7 +3,7 @@ over the samples.
 
 The base of each balance is mass, damping and stiffness along every measured motion, linear dynamics of a higher order
 where there are any (`BaseTerms`), and a constant. Errors are those of the force within the band. A fold's error is that
-of numbers fitted to all other folds (Stone, J. R. Stat. Soc. B 36:111, 1974).
+of parameters fitted to all other folds (Stone, J. R. Stat. Soc. B 36:111, 1974).
 """
 
 from collections.abc import Sequence

@@ -105,7 +105,7 @@ def _beam(first: Regression, linear: Structure, time_left: TimeBudget) -> tuple[
         grown = _add_law_to_each(first, beam)
         if not grown:
             break
-        first = refine_numbers(first, grown[:STRUCTURES_BEAM])
+        first = refine_parameters(first, grown[:STRUCTURES_BEAM])
         grown = [replace(each, errors=first.cross_validated_errors(first.columns_of(each.laws))) for each in grown]
         ranked += grown
         beam = sorted(grown, key=lambda each: each.error)[:STRUCTURES_BEAM]
@@ -200,9 +200,9 @@ def _add_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequenc
     return append_laws(regression, more) if more else regression
 
 
-def refine_numbers(regression: Regression, structures: Sequence[Structure]) -> Regression:
-    """The regression with the nonlinear numbers of the structures' laws moved to the least cross-validated error, each
-    law in the first structure that has it."""
+def refine_parameters(regression: Regression, structures: Sequence[Structure]) -> Regression:
+    """The regression with the nonlinear parameters of the structures' laws moved to the least cross-validated error,
+    each law in the first structure that has it."""
     seen: set[int] = set()
     for structure in structures:
         for place, number in enumerate(structure.laws):
@@ -247,7 +247,9 @@ def simplest_structure(search: StructureSearch) -> Structure:
     """The structure with the fewest parameters whose cross-validated error is close to the smallest."""
     allowed = search.best.error + PLAINER_LEAVES * (search.linear.error - search.best.error)
     enough = [each for each in search.ranked if each.error <= allowed]
-    plain = min(enough, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=search.linear)
+    plain = min(
+        enough, key=lambda each: (count_parameters(search.regression, each.laws), each.error), default=search.linear
+    )
     ceiling = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
     while (richer := _add_further_laws(search, plain, ceiling)) is not None:
         plain = richer
@@ -263,7 +265,7 @@ def _add_further_laws(search: StructureSearch, plain: Structure, ceiling: float)
         for each in search.ranked
         if _extends(search.regression, plain.laws, each.laws) and each.error <= allowed and is_better(plain, each)
     ]
-    return min(more, key=lambda each: (numbers_of(search.regression, each.laws), each.error), default=None)
+    return min(more, key=lambda each: (count_parameters(search.regression, each.laws), each.error), default=None)
 
 
 def _extends(regression: Regression, plain: Sequence[int], richer: Sequence[int]) -> bool:
@@ -277,7 +279,7 @@ def _extends(regression: Regression, plain: Sequence[int], richer: Sequence[int]
     return set(plain) < covered
 
 
-def numbers_of(regression: Regression, laws: Sequence[int]) -> int:
+def count_parameters(regression: Regression, laws: Sequence[int]) -> int:
     """Number of parameters of these laws. The width of a friction's smoothed sign is not counted, and gravity torque
     counts for one less, because it replaces the spring."""
     count = 0

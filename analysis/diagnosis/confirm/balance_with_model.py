@@ -34,7 +34,7 @@ from equalizer.signals.signal import FloatArray
 
 FINEST = 6.0
 """Least samples per period of the band's end at which laws are computed, so that their harmonics are not aliased."""
-MOVED = 0.1
+DIFFERENCE_STEP = 0.1
 """Step of the finite differences, in standard deviations of the calibration."""
 
 
@@ -124,12 +124,12 @@ def _mode_columns(
         return
     seen = motion.position @ (model.output[:m] @ driven_axes(model)).T
     moved = band_motion(seen, motion.rate_hz, motion.band_hz)
-    steps = MOVED * np.eye(len(tuning.names))[first:]
+    steps = DIFFERENCE_STEP * np.eye(len(tuning.names))[first:]
     here, *there = (
         required_force(_structure(add_carried_weight(tuning.tune(step), recording), known), moved).force
         for step in (0 * steps[0], *steps)
     )
-    yield from ((each - here) / MOVED for each in there)
+    yield from ((each - here) / DIFFERENCE_STEP for each in there)
 
 
 def _structure(model: MechanicalModel, known: Sequence[PlacedEffect]) -> MechanicalModel:

@@ -21,44 +21,34 @@ Control Systems 27(5):58 (2007) (laws by inverse dynamics, validated by simulati
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import Balance, family_of
-from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_something
+from analysis.diagnosis.balance.judge_laws import Balance
+from analysis.diagnosis.balance.judged_law import JudgedLaw, family_of
+from analysis.diagnosis.confirm.held_out_gain import explains_half
 from analysis.diagnosis.confirm.laws_for_simulation import (
-    CONSTANT,
     can_be_played,
     constants_of,
     find_special_case,
     hypothesis_of_judged,
-    numbers_beside_laws,
+    parameters_beside_laws,
     refit_laws,
 )
+from analysis.diagnosis.confirm.require_gain import CONSTANT
 from analysis.diagnosis.errors.hypothesis import combine
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import final_errors
-from analysis.diagnosis.search.revise_selection import without_effect
-from analysis.diagnosis.search.search import SearchResult, Unconfirmed
+from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise, judge
-from analysis.diagnosis.settings import CONFIRMED_LEAVES, FURTHER_LAW_OF_ALL, HELD_OUT_ERROR, INTERVAL_FACTOR
+from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise
+from analysis.diagnosis.settings import CONFIRMED_LEAVES, HELD_OUT_ERROR, INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray
 
-CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
-"""Effects that are parameters of a fitted model, and their values."""
-SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
-"""Effects of a sensor that can be seen in its signal alone."""
-ONLY_BESIDE_CALIBRATION = (
-    "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
-    "calibrated model, or recordings of the device in order, would tell"
-)
-BESIDE_RUNAWAY = "the model without it leaves more than the mean of the signal, and all that bounds it gains"
 VAGUE = 1.96 * INTERVAL_FACTOR
 """Half-width of an interval in standard errors: a logarithm with a larger relative error leaves its parameter
 undetermined."""
@@ -145,57 +135,18 @@ def _remove_law(named: _Named, place: int, instead: tuple[int, JudgedLaw] | None
     return [*named[:place], *([] if instead is None else [instead]), *named[place + 1 :]]
 
 
-def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
-    """The result with only those effects named that take as much of the held-out error power as a law of a balance
-    must, and `explained` only where repeats show the noise. Constants are numbers of the model and need no proof."""
-    found = result.found
-    while found.steps and not _takes_enough(result.context, found):
-        found = without_effect(result.context, found, len(found.steps) - 1)
-        result = replace(result, found=found, judgement=judge(found), errors=None)
-    names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed_effects()}
-    if repeats or result.judgement.verdict != "explained" or names <= set(CONSTANTS):
-        return result
-    return replace(result, judgement=replace(result.judgement, verdict="partly_explained"))
-
-
-def unname_doubtful_effects(result: SearchResult) -> SearchResult:
-    """The result with named effects of actuator and sensor made candidates, unless the signal itself shows them: the
-    model was fitted to these recordings, so that a law of the motion that the catalogue lacks may look like a nonlinear
-    or late sensor. What the signal shows is a candidate, too, where the model without it predicts nothing."""
-    found, demoted = result.found, []
-    doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
-    if len(doubtful) < len(found.steps) and not predicts_something(result.context.whole, found.plain):
-        doubtful = list(range(len(found.steps)))
-    for place in reversed(doubtful):
-        gain = held_out_gain(result.context.whole, found.plain, result.context.with_test_score(found.steps[place]))
-        if gain is not None and gain.gain > 0:
-            why_not = BESIDE_RUNAWAY if found.steps[place].newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
-            demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, why_not))
-        found = without_effect(result.context, found, place)
-    if not doubtful:
-        return result
-    kept = tuple(sorted(demoted, key=lambda each: -each.gain))
-    return replace(result, found=found, judgement=judge(found), errors=None, unconfirmed=(*result.unconfirmed, *kept))
-
-
-def _takes_enough(context: SearchContext, found: Explanation) -> bool:
-    """Whether the last effect takes a notable share of the held-out error power beside those before it."""
-    before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
-    return not found.after.held_out > before.held_out + np.log(1 - FURTHER_LAW_OF_ALL) / 2
-
-
 def _from_starts(
     context: SearchContext,
     balances: Sequence[Balance],
     without: tuple[FittedCandidate, FittedCandidate],
     named: Sequence[tuple[int, JudgedLaw]],
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
-    """The fits after each law, and the last of them scored on all samples, started from the balance's linear numbers,
-    or, where these fail, from the model's own. without: the re-tuned model, and the model without new physics on all
-    samples.
+    """The fits after each law, and the last of them scored on all samples, started from the balance's linear
+    parameters, or, where these fail, from the model's own. without: the re-tuned model, and the model without new
+    physics on all samples.
     """
     retuned, plain = without
-    released = numbers_beside_laws(context.tuning, balances, [law.place for _, law in named])
+    released = parameters_beside_laws(context.tuning, balances, [law.place for _, law in named])
     steps = _steps(context, retuned, named, released)
     after = context.with_test_score(steps[-1])
     if np.any(released) and not _is_borne_out(plain, after):
@@ -251,13 +202,13 @@ def _all_of_some(flags: Sequence[bool]) -> bool:
 
 def leaves_open(result: SearchResult) -> bool:
     """Whether the interval of any positive parameter of a law reaches zero, such as a stiffness before sliding."""
-    return bool(_open_numbers(result))
+    return bool(_open_parameters(result))
 
 
 def open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
-    """Places of the named laws with such a number that their special case lacks."""
+    """Places of the named laws with such a parameter that their special case lacks."""
     hypothesis = result.found.steps[-1].fitted.hypothesis
-    found, begin, left_open = [], 0, set(_open_numbers(result))
+    found, begin, left_open = [], 0, set(_open_parameters(result))
     for place, claim in enumerate(hypothesis.claims):
         free = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
         special = {parameter.name for name in claim.effect.simpler for parameter in EFFECTS[name].parameters}
@@ -268,8 +219,8 @@ def open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
     return tuple(found)
 
 
-def _open_numbers(result: SearchResult) -> list[int]:
-    """Positive numbers of the laws, in their order, whose intervals reach zero."""
+def _open_parameters(result: SearchResult) -> list[int]:
+    """Positive parameters of the laws, in their order, whose intervals reach zero."""
     assert result.errors is not None
     numbers = result.found.steps[-1].fitted.hypothesis.numbers
     errors = result.errors[len(result.context.tuning.names) :]

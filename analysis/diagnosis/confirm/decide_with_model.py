@@ -40,15 +40,14 @@ class ResultWithModel:
 
     result: SearchResult
     balances: tuple[Balance, ...] = ()
-    """Empty where nothing is missing, or no motion was measured."""
+    """Empty where no motion was measured."""
 
 
 def decide_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, result: SearchResult, time_left: TimeBudget
 ) -> ResultWithModel:
-    """The result after the decision, and the balances beside the model. result: of the search by simulation."""
-    if result.judgement.verdict not in ("unexplained", "partly_explained") or result.found.statistic is not None:
-        return ResultWithModel(result)
+    """The result after the decision, and the balances beside the model. result: of the search by simulation, sample by
+    sample, which leaves something unexplained."""
     known_noise = all(floor.how == "repeats" for floor in fitting.chosen.floors)
     balances = find_balances_beside_model(recordings, fitting.model, result.context.barred, time_left)
     near_noise = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
@@ -86,7 +85,7 @@ def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
         return f"on held-out data it takes {100 * min(whole.gain, last.gain):.0f} % of the error's power, not a third"
     if np.any(np.abs(found.after.fitted.deviations) >= AT_RETUNING_BOUND * RETUNING_BOUND):
-        return "beside it, a number of the model stands at the end of its tolerance"
+        return "beside it, a parameter of the model stands at the end of its tolerance"
     rival = _best_rival(context, result)
     if rival is not None and _not_better(context, rival, found.after):
         return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"

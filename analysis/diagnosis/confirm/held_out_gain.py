@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.judged_law import bootstrap_draws
+from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
 from analysis.diagnosis.search.search_context import FittedCandidate

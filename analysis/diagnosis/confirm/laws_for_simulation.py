@@ -1,4 +1,4 @@
-"""Converts laws that a force balance named to hypotheses of a simulation, with starting numbers."""
+"""Converts laws that a force balance named to hypotheses of a simulation, with starting parameters."""
 
 import re
 from collections.abc import Sequence
@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
+from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.structures import values_of
+from analysis.diagnosis.confirm.require_gain import CONSTANT
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
@@ -16,7 +17,6 @@ from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-CONSTANT = "constant_force"
 _OWN = re.compile(r"\b[qvf]\b")
 _PREFIX = {"q": "", "v": "v", "f": "f"}
 """Signals of an axis in the language of laws, by their names in a balance's formula."""
@@ -40,11 +40,11 @@ def refit_laws(balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw
     """The laws with the parameters that the balances give when only these laws are fitted."""
     found = []
     for axis, law in named:
-        if law.place == NO_COLUMN:
+        if not law.has_column:
             found.append((axis, law))
             continue
         regression = balances[axis].search.regression
-        places = [other.place for of, other in named if of == axis and other.place != NO_COLUMN]
+        places = [other.place for of, other in named if of == axis and other.has_column]
         values = values_of(regression, places)[places.index(law.place)]
         found.append((axis, law if values is None else _with_values(law, values)))
     return found
@@ -58,8 +58,8 @@ def _with_values(judged: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
 def find_special_case(
     balances: Sequence[Balance], named: Sequence[tuple[int, JudgedLaw]], refining: tuple[int, JudgedLaw]
 ) -> tuple[int, JudgedLaw] | None:
-    """The law of the same axis that another one refines, still with that one's numbers; None where the balance does not
-    hold it, or it is named."""
+    """The law of the same axis that another one refines, still with that one's parameters; None where the balance does
+    not hold it, or it is named."""
     axis, judged = refining
     effect = EFFECTS.get(judged.law.effect)
     taken = {law.law.effect for of, law in named if of == axis}
@@ -103,7 +103,7 @@ def hypothesis_of_judged(axis: int, judged: JudgedLaw, recording: Recording) -> 
     )
 
 
-def numbers_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
+def parameters_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
     """Deviations of mass, damping and stiffness to their values beside the laws of the only balance; zeros
     otherwise."""
     start = np.zeros(len(tuning.names))

@@ -13,7 +13,7 @@ from analysis.diagnosis.contrast.fault import (
     Undo,
     Variant,
     fix_size,
-    proportional_number,
+    proportional_parameter,
 )
 from analysis.diagnosis.contrast.interpolation import shift_samples
 from analysis.diagnosis.contrast.part import Part
@@ -62,9 +62,9 @@ def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: boo
     rms = float(np.std(whole)) or top
     yield from _gains(axis, by_force)
     yield axis.fault(
-        "force_offset", [Variant((axis.undo_by(lambda u, rate: u + rms),), proportional_number("offset", rms))]
+        "force_offset", [Variant((axis.undo_by(lambda u, rate: u + rms),), proportional_parameter("offset", rms))]
     )
-    cubed = Variant((axis.undo_by(lambda u, rate: u + u**3 / top**2),), proportional_number("cubic", 1 / top**2))
+    cubed = Variant((axis.undo_by(lambda u, rate: u + u**3 / top**2),), proportional_parameter("cubic", 1 / top**2))
     yield axis.fault("actuator_cubic", [cubed])
     longest = max(parts, key=lambda part: len(part.command))
     times = delays_to_try(longest.command[:, number], longest.rate_hz)
@@ -125,7 +125,7 @@ def _delay(axis: _Axis, time_s: float) -> Variant:
         return replace(undone, known=part.known & (np.arange(len(part.known)) >= late))
 
     about = lambda size: _delay(axis, size * time_s)  # noqa: E731
-    delay = proportional_number("delay", time_s)
+    delay = proportional_parameter("delay", time_s)
     return Variant((undo,), delay, *AROUND, column_change=change, about=about, exact=True)
 
 
@@ -133,7 +133,7 @@ def _lag(axis: _Axis, time_s: float) -> Variant:
     undo = axis.undo_by(lambda u, rate: apply_lag(u, time_s * rate))
     change: ColumnChange = lambda x, rate, part: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
     about = lambda size: _lag(axis, size * time_s)  # noqa: E731
-    return Variant((undo,), proportional_number("time_constant", time_s), *AROUND, column_change=change, about=about)
+    return Variant((undo,), proportional_parameter("time_constant", time_s), *AROUND, column_change=change, about=about)
 
 
 def _saturation(axis: _Axis, limit: float) -> Variant:
@@ -148,7 +148,7 @@ def _slew_limit(axis: _Axis, limit: float) -> Variant:
 def _deadband(axis: _Axis, width: float) -> Variant:
     undo = axis.undo_by(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
     about = lambda size: _deadband(axis, size * width)  # noqa: E731
-    return Variant((undo,), proportional_number("width", width), *AROUND, about=about)
+    return Variant((undo,), proportional_parameter("width", width), *AROUND, about=about)
 
 
 def delays_to_try(samples: FloatArray, rate_hz: float) -> list[float]:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.judged_law import bootstrap_draws
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.bases import (
@@ -35,6 +34,7 @@ from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
 from analysis.diagnosis.contrast.try_faults import ALL, Trial, Tried, allowed_sizes, try_faults
+from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
 from analysis.diagnosis.settings import (
     BALANCE_HOLDS,
     BOOTSTRAP_LEVEL,

@@ -18,7 +18,7 @@ from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
-from analysis.diagnosis.data.lagged_products import lagged_products
+from analysis.diagnosis.data.correlated_residuals import lagged_products
 from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_KEPT
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
@@ -126,7 +126,7 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
     rows = base.rows(clean), base.rows(faulty)
     valid = tuple(base.valid_samples(parts) for parts in (clean, faulty))
     gap_reach = min(_reach_of_gaps(side) for side in valid)
-    masks = tuple(tuple(_settled(mask, gap_reach) for mask in side) for side in valid)
+    masks = tuple(tuple(_keep_settled(mask, gap_reach) for mask in side) for side in valid)
     fewest = max(FEWEST_ROWS, 2 * rows[0][0].shape[1])
     if any(sum(int(mask.sum()) for mask in side) < fewest for side in masks):
         raise ValueError("too few rows are left of one set to be compared by")
@@ -143,7 +143,7 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
     return ComparedBase(base, sides[0], sides[1], whitening, columns, gap_reach)
 
 
-def _settled(valid: Mask, gap_reach: int) -> Mask:
+def _keep_settled(valid: Mask, gap_reach: int) -> Mask:
     """Valid rows that neither the ends of a part nor gaps reach."""
     around = np.pad(~valid, gap_reach)
     kept = np.array(np.convolve(around, np.ones(2 * gap_reach + 1), "valid") == 0)
@@ -157,7 +157,7 @@ def _settled(valid: Mask, gap_reach: int) -> Mask:
 def _reach_of_gaps(valid: Sequence[Mask]) -> int:
     """`REACH`; 0 where single losses are so frequent that most of a set's rows would be lost: interpolation over a
     sample or two is then good enough."""
-    whole, kept = (sum(int(_settled(mask, reach).sum()) for mask in valid) for reach in (0, REACH))
+    whole, kept = (sum(int(_keep_settled(mask, reach).sum()) for mask in valid) for reach in (0, REACH))
     return REACH if kept >= LEAST_KEPT * whole else 0
 
 
@@ -227,7 +227,7 @@ def rows_with_fault_undone(
 def _lost_rows(compared: ComparedBase, side: RecordingSet, undone: Sequence[Part]) -> tuple[Mask, ...]:
     """Rows that were known, and that what is unknown now reaches."""
     valid = compared.base.valid_samples(undone)
-    return tuple(mask & ~_settled(now, compared.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
+    return tuple(mask & ~_keep_settled(now, compared.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
 
 
 def _unit_of_curve(compared: ComparedBase, side: RecordingSet, curve: Curve) -> float:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from analysis.diagnosis.balance.judged_law import bootstrap_draws
 from analysis.diagnosis.contrast.compare import FOLDS
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
+from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
@@ -23,7 +23,7 @@ from analysis.diagnosis.settings import (
 )
 
 BOUND = float(stdtrit(FOLDS - 1, 0.975))
-"""Half-width of a 95 % interval in standard errors (Student's t for few blocks): a number within it may be zero."""
+"""Half-width of a 95 % interval in standard errors (Student's t for few blocks): a parameter within it may be zero."""
 SAME = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),
@@ -126,12 +126,12 @@ def _why_not(weighed: JudgedFault, differ: bool) -> str:
         return f"it gains {weighed.usual:.2g} between stretches of one kind, too, and {weighed.gain:.2g} here"
     main = next(iter(weighed.values))
     if abs(_distance_from_none(weighed, main)) <= BOUND * weighed.spread[main]:
-        return "the interval of its number holds none"
+        return "the interval of its parameter holds none"
     return ""
 
 
 def _distance_from_none(weighed: JudgedFault, name: str) -> float:
-    """Distance of a number from its value without a fault: 1 for a gain, else 0."""
+    """Distance of a parameter from its value without a fault: 1 for a gain, else 0."""
     return weighed.values[name] - (1.0 if name == "gain" else 0.0)
 
 

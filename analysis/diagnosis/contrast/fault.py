@@ -103,6 +103,6 @@ def fix_size(variant: Variant, grid_error: float) -> Variant:
     return replace(variant, least=1.0, most=1.0, about=None, grid_error=grid_error)
 
 
-def proportional_number(name: str, of_one: float = 1.0) -> Numbers:
+def proportional_parameter(name: str, of_one: float = 1.0) -> Numbers:
     """A fault's parameter in proportion to its only size. of_one: the parameter at size 1."""
     return lambda sizes: {name: of_one * float(sizes[0])}

@@ -51,7 +51,7 @@ def _of_device(compared_bases: Sequence[ComparedBase]) -> list[ComparedBase]:
     return [compared for compared in compared_bases if not isinstance(compared.base, SensorBase)]
 
 
-def _made_by(compared: ComparedBase, rows: FloatArray) -> FloatArray:
+def _split_errors(compared: ComparedBase, rows: FloatArray) -> FloatArray:
     """(n, 2): whitened errors of the clean set's base, split into the contributions of responses and of commands."""
     weights = weights_of(compared.clean.white.T @ compared.clean.white) / compared.columns
     pushed = np.arange(len(weights)) == 0
@@ -64,7 +64,7 @@ def _made_by(compared: ComparedBase, rows: FloatArray) -> FloatArray:
 
 def _rows_late(compared: ComparedBase) -> float:
     """Rows by which the responses lag the commands in the longest part of the faulty set; 0 for less than one."""
-    made = _made_by(compared, max(compared.faulty.rows, key=len))
+    made = _split_errors(compared, max(compared.faulty.rows, key=len))
     longest = len(made) // 4
     if longest < 1:
         return 0.0
@@ -103,7 +103,7 @@ def _correlate_blocks(compared: ComparedBase, runs_on: bool) -> tuple[FloatArray
     times: list[float] = []
     found: list[FloatArray] = []
     for start, rows in zip(starts, compared.faulty.rows, strict=True):
-        made = _made_by(compared, rows)
+        made = _split_errors(compared, rows)
         if len(made) < CONTRAST_BLOCKS or longest < 1:
             continue
         room = next_fast_len(len(made) + longest, True)

@@ -8,9 +8,9 @@ import numpy as np
 from analysis.diagnosis.balance.friction_laws import SHARP
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, proportional_number
+from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, proportional_parameter
 from analysis.diagnosis.contrast.part import Part
-from equalizer.effects.simulation.bristle_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Shape = Callable[[Motion], FloatArray]
@@ -42,7 +42,7 @@ class _Axis:
         return Fault(effect, "mechanism", self.name, self.number, tuple(variants), simpler)
 
     def plain(self, effect: str, shape: Shape, number: str, least: float = 0.0) -> Fault:
-        return self.fault(effect, [Variant((self.of(shape),), proportional_number(number), least=least)])
+        return self.fault(effect, [Variant((self.of(shape),), proportional_parameter(number), least=least)])
 
     def of(self, shape: Shape) -> Undo:
         def undo(part: Part) -> Part:
@@ -88,7 +88,7 @@ def mechanism_faults(
 
 
 def _coulomb_friction(axis: _Axis, wide: float) -> Variant:
-    return Variant((axis.of(lambda m: smooth_sign(axis.v(m), wide)),), proportional_number("level"), least=0.0)
+    return Variant((axis.of(lambda m: smooth_sign(axis.v(m), wide)),), proportional_parameter("level"), least=0.0)
 
 
 def _asymmetric_friction(axis: _Axis, wide: float) -> Variant:
@@ -118,16 +118,16 @@ def _cogging_variant(axis: _Axis, pitch: float) -> Variant:
 def _stops(axis: _Axis, reach: float) -> Iterator[Variant]:
     """End stops at both ends, and at either."""
     both = axis.of(lambda m: np.sign(axis.q(m)) * np.maximum(np.abs(axis.q(m)) - reach, 0.0))
-    yield Variant((both,), _stop_numbers(axis.middle + reach, 1.0), least=0.0)
+    yield Variant((both,), _stop_parameters(axis.middle + reach, 1.0), least=0.0)
     for side in (1.0, -1.0):
         yield _stop(axis, side, reach)
 
 
 def _stop(axis: _Axis, side: float, reach: float) -> Variant:
     undo = axis.of(lambda m: side * np.maximum(side * axis.q(m) - reach, 0.0))
-    return Variant((undo,), _stop_numbers(axis.middle + side * reach, side), least=0.0)
+    return Variant((undo,), _stop_parameters(axis.middle + side * reach, side), least=0.0)
 
 
-def _stop_numbers(position: float, side: float) -> Numbers:
+def _stop_parameters(position: float, side: float) -> Numbers:
     beyond = {} if side * position > 0 else {"side": side}
     return lambda s: {"position": position, "stiffness": float(s[0]), **beyond}

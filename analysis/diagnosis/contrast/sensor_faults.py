@@ -23,12 +23,12 @@ from analysis.diagnosis.contrast.fault import (
     Undo,
     Variant,
     fix_size,
-    proportional_number,
+    proportional_parameter,
 )
 from analysis.diagnosis.contrast.interpolation import noise_kept, resample, shift_samples
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
-from equalizer.effects.simulation.bristle_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 Read = Callable[[FloatArray, float], FloatArray]
@@ -124,7 +124,7 @@ def _common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray
 
 
 def _backlash(channel: _Channel, gap: float) -> Variant:
-    return Variant((channel.of(lambda y, rate: _undo_play(y, gap)),), proportional_number("gap", gap), *WIDELY)
+    return Variant((channel.of(lambda y, rate: _undo_play(y, gap)),), proportional_parameter("gap", gap), *WIDELY)
 
 
 def _undo_play(y: FloatArray, gap: float) -> FloatArray:
@@ -151,7 +151,7 @@ def _cross_axis_sensitivity(channel: _Channel, other: int) -> Fault:
         response[:, own] -= part.response[:, other]
         return replace(part, response=response)
 
-    return channel.fault("cross_axis_sensitivity", [Variant((undo,), proportional_number("from_next"))])
+    return channel.fault("cross_axis_sensitivity", [Variant((undo,), proportional_parameter("from_next"))])
 
 
 def _gain(channel: _Channel, gain: float) -> Variant:
@@ -162,7 +162,7 @@ def _gain(channel: _Channel, gain: float) -> Variant:
 
 
 def _offset(channel: _Channel, shift: float) -> Variant:
-    return Variant((channel.of(lambda y, rate: y - shift),), proportional_number("offset", shift), *WIDELY)
+    return Variant((channel.of(lambda y, rate: y - shift),), proportional_parameter("offset", shift), *WIDELY)
 
 
 def _drift(channel: _Channel, total: float, begun: float) -> Variant:
@@ -171,7 +171,7 @@ def _drift(channel: _Channel, total: float, begun: float) -> Variant:
         response[:, list(channel.numbers)] -= total * drift_shape(part, begun)[:, None]
         return replace(part, response=response)
 
-    return Variant((undo,), proportional_number("total", total), *WIDELY)
+    return Variant((undo,), proportional_parameter("total", total), *WIDELY)
 
 
 def _logger_offset(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
@@ -182,7 +182,7 @@ def _logger_offset(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
 
     about = lambda size: _logger_offset(channel, size * time_s, rate_hz)  # noqa: E731
     passed = noise_kept(time_s * rate_hz)
-    return Variant((undo,), proportional_number("offset", time_s), *AROUND, passed=passed, about=about, exact=True)
+    return Variant((undo,), proportional_parameter("offset", time_s), *AROUND, passed=passed, about=about, exact=True)
 
 
 def _lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Variant:
@@ -200,7 +200,7 @@ def _nonlinearity(channel: _Channel, share: float, power: int, number: str) -> V
     top = channel.top
     curve: Curve = lambda y: _invert_power_law(y / top, share, power) * top  # noqa: E731
     about = lambda size: _nonlinearity(channel, size * share, power, number)  # noqa: E731
-    numbers = proportional_number(number, share / top ** (power - 1))
+    numbers = proportional_parameter(number, share / top ** (power - 1))
     return Variant((channel.of(lambda y, rate: curve(y)),), numbers, *WIDELY, curve=curve, about=about)
 
 
@@ -217,18 +217,18 @@ def _clock_drift(channel: _Channel, late: float, runs_on: bool, parts: Sequence[
     """Readings taken at t (1 + late), resampled to t. runs_on: t counts from the begin of the file, else of each
     part."""
 
-    def taken(part: Part) -> FloatArray:
+    def read_times(part: Part) -> FloatArray:
         before = part.start if runs_on else 0
         return np.asarray((before + np.arange(len(part.response))) / (1 + late) - before)
 
     def undo(part: Part) -> Part:
-        at = taken(part)
+        at = read_times(part)
         undone = channel.of(lambda y, rate: resample(y, at))(part)
         return replace(undone, known=part.known & (at >= 0) & (at <= len(at) - 1))
 
     about = lambda size: _clock_drift(channel, size * late, runs_on, parts)  # noqa: E731
-    passed = noise_kept(np.concatenate([taken(part) for part in parts]))
-    return Variant((undo,), proportional_number("ppm", 1e6 * late), *AROUND, passed=passed, about=about, exact=True)
+    passed = noise_kept(np.concatenate([read_times(part) for part in parts]))
+    return Variant((undo,), proportional_parameter("ppm", 1e6 * late), *AROUND, passed=passed, about=about, exact=True)
 
 
 ROTATIONS = (

@@ -9,7 +9,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.signals.unit_system import FORCES, system_of
 
-PUSHED = {"m": ("force", "N"), "rad": ("torque", "N m")}
+CONVERTED = {"m": ("force", "N"), "rad": ("torque", "N m")}
 """Quantity and unit of the converted command, by the motion's unit."""
 
 
@@ -21,7 +21,7 @@ def with_force_constant(recording: Recording, constants: Sequence[float]) -> tup
     """The recording with its commands as forces, and a sentence about it. constants: one for all commands or one each,
     in N or N m per unit of the command. Raises NoForceConstant."""
     command, moved = recording.command, system_of(recording.command.units, recording.response.units).length
-    if moved not in PUSHED:
+    if moved not in CONVERTED:
         raise NoForceConstant(
             f"the motion is in {moved}: no force constant makes SI of it, so give its unit in the map"
         )
@@ -31,10 +31,10 @@ def with_force_constant(recording: Recording, constants: Sequence[float]) -> tup
         raise NoForceConstant(f"{len(constants)} force constants were given, for {len(command.channels)} commands")
     if not all(np.isfinite(constant) and constant for constant in constants):
         raise NoForceConstant("a force constant is a number other than 0")
-    quantity, unit = PUSHED[moved]
+    quantity, unit = CONVERTED[moved]
     each = np.broadcast_to(np.asarray(constants, dtype=np.float64), (len(command.channels),))
 
-    def pushed(signal: Signal) -> Signal:
+    def convert(signal: Signal) -> Signal:
         return replace(signal, samples=signal.samples * each, quantity=quantity, unit=unit)
 
     own = recording.excitation
@@ -42,6 +42,6 @@ def with_force_constant(recording: Recording, constants: Sequence[float]) -> tup
     per = "" if command.units[0] == "1" else f" per {command.units[0]}"
     text = ", ".join(f"{constant:g}" for constant in constants)
     return (
-        replace(recording, command=pushed(command), excitation=pushed(own) if own is not None and fits else own),
+        replace(recording, command=convert(command), excitation=convert(own) if own is not None and fits else own),
         f"The commands were multiplied by the {quantity} constant that was stated, {text} {unit}{per}.",
     )

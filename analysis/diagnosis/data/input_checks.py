@@ -7,7 +7,6 @@ from itertools import combinations
 import numpy as np
 
 from analysis.diagnosis.data.driven_response import response_significance
-from analysis.diagnosis.data.growth_rate import free_motion_rates, growth_rate
 from analysis.diagnosis.data.observed_parts import samples_to_fit
 from analysis.diagnosis.data.recorded_conditions import weight_problems
 from analysis.diagnosis.settings import (
@@ -22,6 +21,7 @@ from analysis.diagnosis.settings import (
     SHORTEST_SAMPLES,
 )
 from equalizer.effects.placing import PlacingError, place_recorded_effects
+from equalizer.plant.linear_simulation import free_motion_rates, growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.recording import Recording

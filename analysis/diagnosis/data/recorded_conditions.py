@@ -1,18 +1,26 @@
-"""The model and the effects as they were during one recording: with the weight that the device carried, and under the
-conditions that were recorded."""
+"""The model and the effects as they were during one recording: with the weight that the device carried, under the
+conditions that were recorded, and driven by the commands as they were recorded."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
 
-from analysis.diagnosis.data.measured_motion import fill_gaps
+import numpy as np
+
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_read_as_free
+from analysis.diagnosis.settings import MOST_GROWTH
+from equalizer.effects.command_sign import with_reversed_commands
 from equalizer.effects.effect import PlacedEffect
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import driven_axes, growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 ADDED_MASS, ADDED_INERTIA = "added_mass_kg", "added_inertia_kg_m2"
 """Keys of a recording's `meta`: mass or inertia that the device carried along every driven axis, beside the model's."""
+
+
+REVERSED = "turned commands"
+"""Key of a recording's `meta`: channels of its commands that were reversed."""
 
 
 def add_carried_weight(model: MechanicalModel, recording: Recording) -> MechanicalModel:
@@ -28,6 +36,11 @@ def add_mass(model: MechanicalModel, added: float) -> MechanicalModel:
     return replace(model, mass=model.mass + added * axes @ axes.T)
 
 
+def is_unstable_within(model: MechanicalModel, longest_s: float) -> bool:
+    """Whether undisturbed motion grows noticeably within the longest recording."""
+    return growth_rate(model) * longest_s > MOST_GROWTH
+
+
 def effects_under_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> tuple[PlacedEffect, ...]:
     """The effects with the recording's conditions, for those that depend on conditions; missing samples of these are
     interpolated. Without recorded conditions such effects are not changed, and cannot be simulated."""
@@ -41,6 +54,18 @@ def effects_under_conditions(effects: Sequence[PlacedEffect], recording: Recordi
             placed = replace(placed, effect=replace(placed.effect, acts=acting(samples, recording.sample_rate_hz)))
         found.append(placed)
     return tuple(found)
+
+
+def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
+    """The model driven by the commands as they were recorded. model: of the recording as it is compared, where commands
+    may have been reversed, and a free motion has the force per unit mass as its command."""
+    if is_read_as_free(recording):
+        return replace(model, mass=np.eye(len(model.mass)))
+    channels, turned = recording.command.channels, recording.meta.get(REVERSED)
+    if not isinstance(turned, Sequence) or not set(turned) & set(channels):
+        return model
+    signs = [-1.0 if channel in turned else 1.0 for channel in channels]
+    return with_reversed_commands(model, signs, channels, recording.response.channels)
 
 
 def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:

@@ -14,9 +14,9 @@ with linear factors w_j and nonlinear parameters a_j (exponents, widths, time co
 4. `discover` fits the best sums by output error (`fit_laws`), adds the best one, and repeats; `antisymmetric_pairs`
    joins forces of two axes on each other; `snap_exponents` replaces fitted exponents by whole or half numbers where the
    error allows.
-5. `proof` states what must hold before a law is named: held-out stretches of another kind confirm it, its parameters
-   agree between stretches, the shuffled force finds nothing, and no law of other variables fits as well. `add_laws`
-   puts it in the place of effects that it beats.
+5. `validation` states what must hold before a law is named: held-out stretches of another kind confirm it, its
+parameters agree between stretches, the shuffled force finds nothing, and no law of other variables fits as well.
+`add_laws` puts it in the place of effects that it beats.
 
 References: Stone, J. R. Stat. Soc. B 36:111 (1974), cross-validation; Brunton, Proctor and Kutz, PNAS 113:3932 (2016),
 sparse regression of dynamics; Schmidt and Lipson, Science 324:81 (2009). Begin at `discover.py`.

@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.discovery.discover import Discovery, Round, discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
-from analysis.diagnosis.discovery.proof import (
+from analysis.diagnosis.discovery.validation import (
     beats,
     choose_on_held_out,
     does_as_well_with_less,
@@ -51,7 +51,7 @@ class LawSearch:
 
     def add_any(self, result: SearchResult) -> SearchResult:
         """The search with discovered laws in place of its names. Unchanged where it needs no law or none is better;
-        laws that fail a check of `proof` are added as unconfirmed candidates only."""
+        laws that fail a check of `validation` are added as unconfirmed candidates only."""
         fits = result.judgement.named and result.found.after.score.worst_channel <= NOISE_ALONE
         # Beside names that fit, only a single law is the shorter description.
         most = 1 if fits else LAW_MOST_ROUNDS
@@ -89,12 +89,12 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
     is_open = len(checked.steps) < len(found.found.steps)
     fewer = _keep_rounds_of(found, checked) if is_open and _improves_held_out(checked) else None
     if fewer is not None:
-        # A law too weak for these recordings to fix its numbers takes no other law's name away.
+        # A law too weak for these recordings to fix its parameters takes no other law's name away.
         found, is_open = fewer, False
     rivals, judged = _rivals(context, known), judge(checked)
     reasons = (*_reasons_of_rivals(context, known, found, rivals), *_reasons_of_fit(found, checked))
     if is_open:
-        reasons = (*reasons, "these recordings leave its numbers as good as open")
+        reasons = (*reasons, "these recordings leave its parameters as good as open")
     if not judged.named:
         reasons = (*reasons, "what was kept for the test does not bear it out")
     if reasons:
@@ -106,7 +106,7 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
 def _reasons_of_rivals(
     context: SearchContext, known: Explanation, found: Discovery, rivals: Sequence[FittedCandidate]
 ) -> Iterator[str]:
-    """Why the laws do not take the place of what the catalogue offers, and fail the checks of `proof`."""
+    """Why the laws do not take the place of what the catalogue offers, and fail the checks of `validation`."""
     if known.steps and may_stand_for_a_law(context, known):
         rivals = [rival for rival in rivals if not does_as_well_with_less(context, found, rival)]
     yield from reasons_against(context, found, rivals)
@@ -123,8 +123,8 @@ def _reasons_of_fit(found: Discovery, checked: Explanation) -> Iterator[str]:
 
 
 def _needs_law(result: SearchResult) -> bool:
-    """Whether a law may be searched for: only whole simulations prove one, and where noise alone remains, there is none
-    to be found, unless the names may stand for it."""
+    """Whether a law may be searched for: only whole simulations can confirm one, and where noise alone remains, there
+    is none to be found, unless the names may stand for it."""
     context, found = result.context, result.found
     if (
         context.measure.name != "free simulation"

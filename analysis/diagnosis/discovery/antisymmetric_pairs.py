@@ -56,7 +56,7 @@ def _pair(own: Sum, partner: Sum, factor: float) -> Sum:
 
 def pair_starts(pair: Sum) -> tuple[Sum, ...]:
     """Where its fit may start: where the axes are coupled, either half alone was fitted as the whole pair, beside a
-    coupled number of the model, and so is twice as large."""
+    coupled parameter of the model, and so is twice as large."""
     assert pair.partner is not None
     half, opposite = pair.factors[0] / 2, replace(pair.partner, factors=(pair.partner.factors[0] / 2,))
     return pair, replace(pair, factors=(half,), partner=opposite)
@@ -70,12 +70,12 @@ def is_coupling(of: Sum) -> bool:
 def coupling_taken(tuning: Tuning, fitted: Fitted) -> float:
     """Sum of squares of the deviations of the model's coupled damping and stiffness from their calibration."""
     m = tuning.model.inputs
-    places = [_coupled_number(tuning, prefix, i, j) for prefix in ("v", "") for i, j in combinations(range(m), 2)]
+    places = [_coupled_parameter(tuning, prefix, i, j) for prefix in ("v", "") for i, j in combinations(range(m), 2)]
     return float(np.sum(fitted.deviations[places] ** 2))
 
 
 def as_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted, Sum], pair: Sum) -> Fitted | None:
-    """The fit of one force alone as a pair of half its size: the model's coupled number takes the rest, so that both
+    """The fit of one force alone as a pair of half its size: the model's coupled parameter takes the rest, so that both
     foretell the same. None where they are of different motions, or that number would leave its bounds."""
     fitted, of = single
     assert pair.partner is not None
@@ -92,7 +92,7 @@ def as_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted, Sum], p
 
 def with_equal_halves(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> Fitted:
     """The fit with the two factors of each pair made opposite and equal, and what they had in common given to the
-    model's coupled number, which does the same. Unchanged where there is no pair, or the number would leave its
+    model's coupled parameter, which does the same. Unchanged where there is no pair, or the parameter would leave its
     bounds."""
     found = _coupled_laws(fitted, measure.records[0].recording.command.channels)
     values, deviations = (
@@ -102,7 +102,7 @@ def with_equal_halves(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> 
     for (prefix, axis, other), (claim, factor) in found.items():
         partner, opposite = found.get((prefix, other, axis), (claim, 0.0))
         if axis < other and factor * opposite < 0:
-            shared, number = (factor + opposite) / 2, _coupled_number(tuning, prefix, axis, other)
+            shared, number = (factor + opposite) / 2, _coupled_parameter(tuning, prefix, axis, other)
             deviations[number] -= shared / tuning.deviation[number]
             values[claim]["p0"], values[partner]["p0"] = factor - shared, opposite - shared
     if (deviations == fitted.deviations).all() or np.abs(deviations).max() > RETUNING_BOUND:
@@ -120,7 +120,7 @@ def is_taken_by_coupling(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]
     for (prefix, axis, other), (_, factor) in found.items():
         opposite = found.get((prefix, other, axis), (0, 0.0))[1]
         half = abs(factor - opposite) / 2 if factor * opposite < 0 else 0.0
-        number = _coupled_number(tuning, prefix, axis, other)
+        number = _coupled_parameter(tuning, prefix, axis, other)
         if half / tuning.deviation[number] - abs(fitted.deviations[number]) <= RETUNING_BOUND:
             return True
     return False
@@ -137,8 +137,8 @@ def _coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, in
     return found
 
 
-def _coupled_number(tuning: Tuning, prefix: str, axis: int, other: int) -> int:
-    """Which of the model's numbers is the coupled damping (prefix v) or stiffness of two axes."""
+def _coupled_parameter(tuning: Tuning, prefix: str, axis: int, other: int) -> int:
+    """Which of the model's parameters is the coupled damping (prefix v) or stiffness of two axes."""
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     return (1 if prefix else 2) * len(pairs) + pairs.index((min(axis, other), max(axis, other)))

@@ -37,7 +37,7 @@ class RankedSums:
 
 
 def best_sums(base: Products, terms: Sequence[Term], time_left: TimeBudget) -> RankedSums:
-    """Beam search for the sums with the least held-out error. base: products of the model's numbers alone."""
+    """Beam search for the sums with the least held-out error. base: products of the model's parameters alone."""
     view = base.view
     kept, columns = _term_columns(view, terms)
     order = _rank_terms(base, columns)
@@ -94,7 +94,7 @@ def _is_worth_it(shorter: Sum, longer: Sum) -> bool:
 
 
 def _description_length(view: View) -> Callable[[Sum], float]:
-    """Bayesian information criterion (Schwarz 1978): squares over the noise's, plus log(samples) for each number."""
+    """Bayesian information criterion (Schwarz 1978): squares over the noise's, plus log(samples) for each parameter."""
     samples = len(view.residual)
 
     def price(of: Sum) -> float:

@@ -81,7 +81,7 @@ def discover(
     most: int = LAW_MOST_ROUNDS,
     alone: bool = False,
 ) -> Discovery | None:
-    """The laws found, at most `most`, fitted by output error; None where none is worth its numbers. known: what the
+    """The laws found, at most `most`, fitted by output error; None where none is worth its parameters. known: what the
     named effects explain. alone: only laws that are likely to explain all; given up as soon as they are seen not to."""
     context = replace(context, map_=limit_map(context.map_, time_left))
     retuned = known.retuned.fitted

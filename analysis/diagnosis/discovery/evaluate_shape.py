@@ -34,7 +34,8 @@ def columns_of(evidence: Evidence) -> Columns:
 
 
 def evaluate_shape(shape: str, numbers: Sequence[float], columns: Columns, rate_hz: float) -> FloatArray:
-    """(n,): the formula `shape` with these numbers; NaN or inf outside its domain. columns: signals by name, (n,)."""
+    """(n,): the formula `shape` with these parameters; NaN or inf outside its domain. columns: signals by name,
+    (n,)."""
     tree = parse_formula(shape, template=True)[0]
     with np.errstate(all="ignore"):
         if any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(tree)):

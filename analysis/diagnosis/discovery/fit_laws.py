@@ -54,15 +54,17 @@ def fit_sums(
     close = [
         pair
         for pair in rest
-        if time_left() and _count_numbers(pair) < _count_numbers(refined[0]) and inseparable(refined[0][0], pair[0])
+        if time_left()
+        and _count_parameters(pair) < _count_parameters(refined[0])
+        and inseparable(refined[0][0], pair[0])
     ]
     refined += [(context.candidate(_refine(context, candidate.fitted)), item) for candidate, item in close]
     return (*refined, *(pair for pair in rest if pair not in close))
 
 
 def _starting_fits(context: SearchContext, base: Fitted, each: Sum) -> list[Fitted]:
-    """The sum added to the fit, with the model's own numbers as they were or shifted as the sum's fit has them,
-    whichever costs less; where re-tuning ended at a bound, for want of this law, also with the numbers as given."""
+    """The sum added to the fit, with the model's own parameters as they were or shifted as the sum's fit has them,
+    whichever costs less; where re-tuning ended at a bound, for want of this law, also with the parameters as given."""
     recording = context.measure.records[0].recording
     shifted = np.clip(base.deviations + each.model_shift, -RETUNING_BOUND, RETUNING_BOUND)
     given = np.zeros_like(base.deviations)
@@ -94,18 +96,18 @@ def _like_best(
 def put_plainest_first(
     context: SearchContext, pairs: Sequence[tuple[FittedCandidate, Sum]]
 ) -> list[tuple[FittedCandidate, Sum]]:
-    """By error; but first comes, of those that these data cannot tell from the best, the one with fewest numbers; of
-    forces that are linear in another axis's motion, the one that asks least of the model's own coupled numbers."""
+    """By error; but first comes, of those that these data cannot tell from the best, the one with fewest parameters; of
+    forces that are linear in another axis's motion, the one that asks least of the model's own coupled parameters."""
     ranked = sorted(pairs, key=lambda pair: pair[0].score.mean_log_error)
     alike = [pair for pair in ranked if inseparable(ranked[0][0], pair[0])]
-    first = min(alike, key=_count_numbers)
+    first = min(alike, key=_count_parameters)
     if is_coupling(first[1]):
-        same = [pair for pair in alike if is_coupling(pair[1]) and _count_numbers(pair) == _count_numbers(first)]
+        same = [pair for pair in alike if is_coupling(pair[1]) and _count_parameters(pair) == _count_parameters(first)]
         first = min(same, key=lambda pair: coupling_taken(context.tuning, pair[0].fitted))
     return [first, *(pair for pair in ranked if pair is not first)]
 
 
-def _count_numbers(pair: tuple[FittedCandidate, Sum]) -> int:
+def _count_parameters(pair: tuple[FittedCandidate, Sum]) -> int:
     """Free numbers of a sum, without exponents that are whole or half numbers, and a soft limit's factor of 1."""
     candidate, of = pair
     law = laws_of(candidate.fitted.hypothesis)[-1]

@@ -1,7 +1,7 @@
-"""Fits the free numbers of a sum of terms to a fit's residual: Gauss-Newton with variable projection.
+"""Fits the free parameters of a sum of terms to a fit's residual: Gauss-Newton with variable projection.
 
-Factors and the model's own numbers are solved for at each step, so that only what is not linear is searched (variable
-projection, Golub and Pereyra 1973).
+Factors and the model's own parameters are solved for at each step, so that only what is not linear is searched
+(variable projection, Golub and Pereyra 1973).
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
 _MOVE, _MOVE_OF_LINE = 1e-3, 1e-5
-"""Moves of a number for its slope. A frequency that moved by 0.1 % would be out of phase at a recording's end."""
+"""Shifts of a parameter for its slope. A frequency that moved by 0.1 % would be out of phase at a recording's end."""
 _ROUNDS = 8
 _CONVERGED = 1e-3
 """Relative decrease of the cost below which a step is the last."""
@@ -39,7 +39,7 @@ class Sum:
     spread: float
     """Jackknife error of the first factor over the blocks, as a share of it."""
     model_shift: tuple[float, ...]
-    """(t,): change of the model's own numbers that is fitted with it, in standard deviations."""
+    """(t,): change of the model's own parameters that is fitted with it, in standard deviations."""
     acts_on: ActsOn = "force"
     partner: "Sum | None" = None
     """The same on another axis, as a part of the same law."""
@@ -62,8 +62,8 @@ def column_of(view: View, term: Term) -> FloatArray | None:
 
 
 def fit_sum(base: Products, terms: Sequence[Term]) -> Sum | None:
-    """The sum with its numbers, factors and held-out errors. base: products of the model's numbers alone. None where
-    the terms are not finite at their starting numbers."""
+    """The sum with its parameters, factors and held-out errors. base: products of the model's parameters alone. None
+    where the terms are not finite at their starting parameters."""
     view = base.view
     at = _Point(tuple(terms), *_columns(view, terms))
     if at.columns is None:
@@ -124,7 +124,7 @@ def _gauss_newton_step(base: Products, at: _Point, best: Solution) -> tuple[_Poi
     for number, term in enumerate(at.terms):
         for place in range(len(term.numbers)):
             move = _MOVE_OF_LINE if f"p{place}*t" in term.shape else _MOVE
-            column = column_of(view, _move_number(term, place, move))
+            column = column_of(view, _shift_parameter(term, place, move))
             if column is None:
                 return None
             slopes.append(factors[number] * (column - at.columns[number]) / move)
@@ -138,7 +138,7 @@ def _gauss_newton_step(base: Products, at: _Point, best: Solution) -> tuple[_Poi
     for share in (1.0, 0.4, 0.15, 0.05):
         terms = at.terms
         for (number, place), move in zip(moves, step, strict=True):
-            moved = _move_number(terms[number], place, share * float(move))
+            moved = _shift_parameter(terms[number], place, share * float(move))
             terms = (*terms[:number], moved, *terms[number + 1 :])
         columns = _columns(view, terms)[0]
         if columns is None:
@@ -157,7 +157,7 @@ def _damp_slopes(joint: Products, count: int) -> Products:
     return replace(joint, squares=squares)
 
 
-def _move_number(term: Term, place: int, move: float) -> Term:
+def _shift_parameter(term: Term, place: int, move: float) -> Term:
     """The term with one number moved within its bounds: exponents and angles by `move`, others by the factor
     exp(move)."""
     numbers, (low, high) = list(term.numbers), term.bounds[place]

@@ -1,8 +1,8 @@
-"""The grammar of discovered laws: terms of the motion and the commands, with free numbers.
+"""The grammar of discovered laws: terms of the motion and the commands, with free parameters.
 
-A term is a shape times a factor; its free numbers (exponents, widths, time constants, pitches) start on a grid that the
-recording's own travel, speed and duration span. What is linear in an axis's own motion is no term: mass, damping and
-stiffness are numbers of the model. docs/diagnosis.md says what the grammar holds and what it does not.
+A term is a shape times a factor; its free parameters (exponents, widths, time constants, pitches) start on a grid that
+the recording's own travel, speed and duration span. What is linear in an axis's own motion is no term: mass, damping
+and stiffness are parameters of the model. docs/diagnosis.md says what the grammar holds and what it does not.
 """
 
 import re
@@ -22,11 +22,11 @@ _SIGNAL = re.compile(rf"\b(?:[vfa]?[{AXES}]|t)\b")
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A term of a discovered law: a formula with free numbers, where they start, and their bounds; its factor is fitted
-    apart."""
+    """A term of a discovered law: a formula with free parameters, where they start, and their bounds; its factor is
+    fitted apart."""
 
     shape: str
-    """Formula in the language of laws; its free numbers are p0, p1, …"""
+    """Formula in the language of laws; its free parameters are p0, p1, …"""
     numbers: tuple[float, ...] = ()
     """Where they start."""
     bounds: tuple[tuple[float, float], ...] = ()
@@ -132,7 +132,7 @@ def _saturations(of: Axis) -> Iterator[Term]:
 
 
 def bent_terms(name: str, size: float) -> Iterator[Term]:
-    """Soft limits of a command or a reading, less itself, so that small signals pass unchanged: the model's numbers
+    """Soft limits of a command or a reading, less itself, so that small signals pass unchanged: the model's parameters
     hold no gain that could make up for it. size: its largest value."""
     for curve, share in product(("tanh({0}/p0)*p0", "atan({0}/p0)*p0", "{0}/(1 + abs({0})/p0)"), (0.2, 0.5, 1.0, 2.0)):
         yield Term(f"({curve.format(name)} - {name})", (share * size,), ((1e-2 * size, 20 * size),))

@@ -17,7 +17,7 @@ _SIGNAL = re.compile(rf"\b([vfa]?)([{AXES}])\b")
 
 
 def law_of_sum(of: Sum, recording: Recording) -> Law:
-    """The sum as a law: p0 is the first term's factor, then its numbers, then the next term's. The grammar calls the
+    """The sum as a law: p0 is the first term's factor, then its parameters, then the next term's. The grammar calls the
     driven axes and the channels of the response x, y, z in their order; the law calls them as the recording does. What
     hangs on commands alone and remembers nothing is a law of the command: then it can be undone."""
     channels = law_channels(recording)
@@ -54,15 +54,15 @@ def hypothesis_of_sum(of: Sum, recording: Recording) -> Hypothesis:
 
 
 def laws_of(hypothesis: Hypothesis) -> tuple[Law | None, ...]:
-    """Per claim, with its numbers as they are fitted; None for what has a name."""
+    """Per claim, with its parameters as they are fitted; None for what has a name."""
     return tuple(
         None
         if claim.effect.law is None
-        else claim.effect.law.with_numbers(_numbers_in_order(hypothesis.of_claim(number)[0].values))
+        else claim.effect.law.with_numbers(_values_in_order(hypothesis.of_claim(number)[0].values))
         for number, claim in enumerate(hypothesis.claims)
     )
 
 
-def _numbers_in_order(values: object) -> Sequence[float]:
+def _values_in_order(values: object) -> Sequence[float]:
     assert isinstance(values, dict)
     return [values[f"p{place}"] for place in range(len(values))]

@@ -16,10 +16,10 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.discovery.evaluate_shape import columns_of
 from analysis.diagnosis.discovery.grammar import AXES, Columns
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.output_error import MOVED, Fitted
+from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.forces.missing_force import axis_transfer
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.forces.transfer import axis_transfer
 from analysis.diagnosis.settings import LAW_BLOCKS, LAW_POWER_KEPT, SETTLED_CONSTANTS
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.law import ActsOn
@@ -83,13 +83,13 @@ class FilteredRecord:
 
     def _select_blocks(self, spectrum: ComplexArray) -> FloatArray:
         count = 2 * (len(spectrum) - 1)
-        course = irfft(spectrum, count, axis=0) * np.sqrt(count / self.length)
-        return np.concatenate([course[part] for part in self.block_slices])
+        filtered = irfft(spectrum, count, axis=0) * np.sqrt(count / self.length)
+        return np.concatenate([filtered[part] for part in self.block_slices])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """The filtered residual of one output, with what the model's own numbers would explain of it."""
+    """The filtered residual of one output, with what the model's own parameters would explain of it."""
 
     output: int
     acts_on: ActsOn
@@ -100,10 +100,10 @@ class View:
     residual: FloatArray
     """(s,), over all records and blocks."""
     parameter_columns: FloatArray
-    """(t + 1, s): what one standard deviation of each of the model's own numbers would explain of it, and a constant
+    """(t + 1, s): what one standard deviation of each of the model's own parameters would explain of it, and a constant
     force or reading."""
-    pull: FloatArray
-    """(t + 1,): the calibration's values of these numbers less the present ones, in standard deviations."""
+    to_calibration: FloatArray
+    """(t + 1,): the calibration's values of these parameters less the present ones, in standard deviations."""
     edges: tuple[int, ...]
     """Edges of the blocks."""
     noise: float
@@ -122,7 +122,7 @@ def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Vie
         [_parameter_columns(measure, tuning, fitted, seen, number) for number in range(len(fitted.deviations))]
     )
     edges = _edges(seen)
-    pull = np.append(-fitted.deviations, 0.0)
+    to_calibration = np.append(-fitted.deviations, 0.0)
     views = []
     for output in range(min(residual.shape[1], model.inputs + len(AXES))):
         acts_on: ActsOn = "force" if output < model.inputs else "response"
@@ -130,7 +130,7 @@ def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Vie
         constant = np.concatenate([each.column(np.ones(len(each.missing_force)), output) for each in seen])
         tuned = np.vstack([columns[:, :, output].reshape(-1, len(residual)), constant])
         noise = _noise(measure, seen, axis) if acts_on == "force" else float((measure.noise / measure.unit)[axis] ** 2)
-        views.append(View(output, acts_on, axis, seen, residual[:, output], tuned, pull, edges, noise))
+        views.append(View(output, acts_on, axis, seen, residual[:, output], tuned, to_calibration, edges, noise))
     return tuple(views)
 
 
@@ -149,7 +149,7 @@ def _parameter_columns(
     if number < 3 * len(pairs):
         return np.concatenate([each.filter_forces(_parameter_force(each, tuning, pairs, number)) for each in seen])
     base = measure.residuals(tuning.tune(fitted.deviations), ())
-    for move in (MOVED, -MOVED):
+    for move in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
         there = fitted.deviations.copy()
         there[number] += move
         try:

@@ -1,7 +1,7 @@
 """Screens terms by cross-validation: how much of a fit's residual each explains beside what re-tuning explains.
 
-Each block's error is that of numbers fitted to all others (Stone, J. R. Stat. Soc. B 36:111, 1974), with the model's
-own numbers pulled to their calibration, and within the bounds of re-tuning. Terms are tried together, as products of
+Each block's error is that of parameters fitted to all others (Stone, J. R. Stat. Soc. B 36:111, 1974), with the model's
+own parameters pulled to their calibration, and within the bounds of re-tuning. Terms are tried together, as products of
 columns.
 """
 
@@ -25,7 +25,7 @@ class Products:
 
     view: View
     held: tuple[FloatArray, ...]
-    """(s,) each: columns of terms already taken, after the model's numbers and a constant."""
+    """(s,) each: columns of terms already taken, after the model's parameters and a constant."""
     squares: FloatArray
     """(blocks, k, k)"""
     with_residual: FloatArray
@@ -42,24 +42,25 @@ class Products:
     def calibration(self) -> FloatArray:
         """(k,): prior precision of each column's weight."""
         sizes = self.squares.sum(axis=0).diagonal()
-        pulled = np.where(sizes > 0, 1e-10 * sizes, 1.0)
-        pulled[: len(self.view.pull) - 1] = 1.0
-        return pulled
+        precision = np.where(sizes > 0, 1e-10 * sizes, 1.0)
+        precision[: len(self.view.to_calibration) - 1] = 1.0
+        return precision
 
     @property
     def wanted(self) -> FloatArray:
         """(k,): the prior's part of the right side."""
-        pull = np.zeros(len(self.calibration))
-        pull[: len(self.view.pull)] = self.view.pull
-        return self.calibration * pull
+        offset = np.zeros(len(self.calibration))
+        offset[: len(self.view.to_calibration)] = self.view.to_calibration
+        return self.calibration * offset
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
-        """(k,) each: bounds of the weights. The model's numbers stay within those of re-tuning: with mass, damping and
-        stiffness free to vanish, a force that takes the command away would explain everything."""
-        tuned, k = len(self.view.pull) - 1, len(self.calibration)
+        """(k,) each: bounds of the weights. The model's parameters stay within those of re-tuning: with mass, damping
+        and stiffness free to vanish, a force that takes the command away would explain everything."""
+        known, k = self.view.to_calibration, len(self.calibration)
+        tuned = len(known) - 1
         low, high = np.full(k, -np.inf), np.full(k, np.inf)
-        low[:tuned], high[:tuned] = self.view.pull[:tuned] - RETUNING_BOUND, self.view.pull[:tuned] + RETUNING_BOUND
+        low[:tuned], high[:tuned] = known[:tuned] - RETUNING_BOUND, known[:tuned] + RETUNING_BOUND
         return low, high
 
     def cross(self, columns: FloatArray) -> FloatArray:
@@ -76,7 +77,7 @@ class Products:
 
 
 def products_of(view: View) -> Products:
-    """Products of the model's numbers and a constant."""
+    """Products of the model's parameters and a constant."""
     base, edges = view.parameter_columns, list(pairwise(view.edges))
     return Products(
         view,
@@ -122,14 +123,14 @@ def cross_validate_terms(of: Products, columns: FloatArray) -> TermErrors:
     without, with_it, factors = [], [], []
     for number in range(len(parts)):
         squares = of.squares.sum(axis=0) - of.squares[number] + np.diag(of.calibration)
-        pull = of.with_residual.sum(axis=0) - of.with_residual[number] + of.wanted
+        right_side = of.with_residual.sum(axis=0) - of.with_residual[number] + of.wanted
         other, size = cross.sum(axis=0) - cross[number], own.sum(axis=0) - own[number]
         bordered = _border(squares, other, size)
-        right = np.column_stack([np.tile(pull, (len(size), 1)), seen.sum(axis=0) - seen[number]])
+        right = np.column_stack([np.tile(right_side, (len(size), 1)), seen.sum(axis=0) - seen[number]])
         low, high = (np.append(bound, side) for bound, side in zip(of.limits, (-np.inf, np.inf), strict=True))
         solved = solve_within(bordered, right, low, high)
         weights, factor = solved[:, :-1].T, solved[:, -1]
-        alone = solve_within(squares[None], pull[None], *of.limits)[0]
+        alone = solve_within(squares[None], right_side[None], *of.limits)[0]
         without.append(_held_out_squares(of, number, alone[:, None])[0])
         with_it.append(
             _held_out_squares(of, number, weights)
@@ -193,6 +194,6 @@ def solve(of: Products) -> Solution:
     """Weights and cost of the base columns, fitted to all blocks together."""
     pulled, squares, seen = of.calibration, of.squares.sum(axis=0), of.with_residual.sum(axis=0)
     weights = solve_within((squares + np.diag(pulled))[None], (seen + of.wanted)[None], *of.limits)[0]
-    own = weights[: len(of.view.pull)] - of.view.pull
+    own = weights[: len(of.view.to_calibration)] - of.view.to_calibration
     left = float(of.power.sum() - 2 * seen @ weights + weights @ squares @ weights)
     return Solution(weights, left + float(pulled[: len(own)] @ own**2))

@@ -14,8 +14,7 @@ from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, SearchContext
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
 from equalizer.effects.discovered_law import law_channels, law_effect, law_values
-from equalizer.laws.law import Law
-from equalizer.laws.roles import roles
+from equalizer.laws.law import Law, roles
 
 _CUBE_WITH_MEMORY = re.compile(r"\b(\w+)\*lag\(\1\*\*2, (?:p(\d+)|0)\)")
 _LIMIT = re.compile(r"(\w+) \+ p0\*\((.+) - \1\)")
@@ -38,7 +37,7 @@ def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
 
 
 def _with_simple_exponents(context: SearchContext, whole: Hypothesis, errors: np.ndarray) -> Hypothesis | None:
-    """The hypothesis with simple exponents; None where none changes. errors: (numbers,), standard errors."""
+    """The hypothesis with simple exponents; None where none changes. errors: (parameters,), standard errors."""
     recording = context.measure.records[0].recording
     parts, changed, first = [], False, 0
     for number, (claim, law) in enumerate(zip(whole.claims, laws_of(whole), strict=True)):
@@ -69,7 +68,7 @@ def _without_short_memory(law: Law, sample_s: float) -> Law:
     if found is None or found[2] is None or law.numbers[int(found[2])] >= sample_s:
         return law
     # The number is written in and the place that held it with it, so that those after it move up.
-    short = substitute_number(law, int(found[2]), 0.0)
+    short = substitute_parameter(law, int(found[2]), 0.0)
     return replace(short, expression=_CUBE_WITH_MEMORY.sub(r"\1**3", short.expression, count=1))
 
 
@@ -83,7 +82,7 @@ def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:
         near = max(round(2 * value) / 2, 0.5)
         reach = 1.96 * INTERVAL_FACTOR * float(errors[place]) * value
         if abs(value - near) <= max(reach, LAW_SNAP * value):
-            found = substitute_number(found, place, near)
+            found = substitute_parameter(found, place, near)
     if found.numbers == law.numbers:
         found = _simplify_limit(law, float(errors[0]) * abs(law.numbers[0]))
     return replace(found, expression=simplify_powers(found.expression.removeprefix("1*")))
@@ -100,10 +99,10 @@ def _simplify_limit(law: Law, error: float) -> Law:
     limit = _LIMIT.fullmatch(law.expression)
     if limit is None or not reach < 1 or not is_whole_limit(law, max(reach, LAW_SNAP)):
         return law
-    return substitute_number(replace(law, expression=f"p0*{limit[2]}"), 0, 1.0)
+    return substitute_parameter(replace(law, expression=f"p0*{limit[2]}"), 0, 1.0)
 
 
-def substitute_number(law: Law, place: int, value: float) -> Law:
+def substitute_parameter(law: Law, place: int, value: float) -> Law:
     """The law with free number `place` replaced by a value in the formula."""
     text = re.sub(rf"\bp{place}\b", f"{value:g}", law.expression)
     renamed = re.sub(r"\bp(\d+)\b", lambda found: f"p{int(found[1]) - (int(found[1]) > place)}", text)

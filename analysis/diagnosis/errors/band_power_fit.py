@@ -1,4 +1,4 @@
-"""Robust Gauss-Newton least squares on band powers, for the numbers of a hypothesis and of the model.
+"""Robust Gauss-Newton least squares on band powers, for the parameters of a hypothesis and of the model.
 
 Predictions of impacts are chaotic, so that finite differences take large steps, and each band of a segment is weighted
 by the inverse of its variance between simulations.
@@ -19,11 +19,11 @@ from equalizer.signals.signal import FloatArray
 MOVES, WIDEST = (0.02, 0.2), 12.0
 """Finite-difference step of a logarithm, least and most; and relative to its usual step."""
 LONGEST_STEP = 0.5
-"""Largest step of a logarithm; two finite-difference steps for numbers of either sign."""
+"""Largest step of a logarithm; two finite-difference steps for parameters of either sign."""
 MOST_BY_CHANCE = 0.8
 """Largest share of a column's apparent information that is attributed to chance."""
 LEAST_KNOWN = 1e-6
-"""Information on a combination of numbers to which the prediction is not sensitive."""
+"""Information on a combination of parameters to which the prediction is not sensitive."""
 SHARES = (1.0, 0.3, 0.1, 0.03)
 """Factors on a step that are tried (line search)."""
 FLOOR = 0.04
@@ -35,7 +35,7 @@ RESTS = 1e-4
 
 
 PERTURBATION = 1e-9
-"""Difference in the logarithm of a number between the simulations of an ensemble."""
+"""Difference in the logarithm of a parameter between the simulations of an ensemble."""
 
 
 def perturb(hypothesis: Hypothesis, number: int) -> Hypothesis:
@@ -54,9 +54,9 @@ class View:
     spread: float | FloatArray = 0.05
     """Standard deviation of the logarithms between simulations; (stretches, bands, c), or one for all."""
     by_deviations: FloatArray | None = None
-    """(t, stretches, bands, c): sensitivity to the model's own numbers; None = these are not fitted."""
+    """(t, stretches, bands, c): sensitivity to the model's own parameters; None = these are not fitted."""
     ensemble: int = 1
-    """Ensemble size: simulations over which a prediction is averaged, from numbers that differ by PERTURBATION."""
+    """Ensemble size: simulations over which a prediction is averaged, from parameters that differ by PERTURBATION."""
 
     def predict(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
         """(stretches, bands, c): mean prediction over the ensemble; NaN throughout where the model is invalid."""
@@ -93,14 +93,14 @@ class BandPowerFit:
     cost: float
     """Mean Huber loss over the fitted bands; inf for an invalid model."""
     errors: FloatArray
-    """(numbers,): standard errors of the point; empty before a step."""
+    """(parameters,): standard errors of the point; empty before a step."""
 
     def off(self, view: View) -> FloatArray:
         return np.asarray(view.power.measured - self.predicted)
 
 
 def evaluate_hypothesis(view: View, deviations: FloatArray, hypothesis: Hypothesis) -> BandPowerFit:
-    """Predicted band powers and their robust cost (Huber) at given numbers, without fitting; infinite where a
+    """Predicted band powers and their robust cost (Huber) at given parameters, without fitting; infinite where a
     prediction is not finite."""
     predicted = view.predict(deviations, hypothesis)
     weights = view.weights
@@ -126,7 +126,7 @@ def fit_band_power(view: View, start: BandPowerFit, rounds: int) -> BandPowerFit
 
 
 def hypothesis_columns(view: View, at: BandPowerFit) -> FloatArray:
-    """(numbers, stretches, bands, c): sensitivity to the hypothesis's numbers, by central differences."""
+    """(parameters, stretches, bands, c): sensitivity to the hypothesis's parameters, by central differences."""
     numbers = at.hypothesis.numbers
     jobs = [(number, way) for number in range(len(numbers)) for way in (1.0, -1.0)]
 
@@ -150,7 +150,7 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
     columns = np.vstack([*known, *own])
     columns[~np.isfinite(columns).all(axis=1)] = 0.0
     trust = np.minimum(1.0, TRUSTED / np.maximum(np.abs(off), TRUSTED))
-    # Steps of the model's own numbers are small; where they leave a large residual, an effect is missing.
+    # Steps of the model's own parameters are small; where they leave a large residual, an effect is missing.
     weighted = columns * (trust**3 if t else trust)
     rhs = weighted @ off
     products = weighted @ columns.T
@@ -172,7 +172,8 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
 
 
 def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
-    """(numbers,): standard errors from the information matrix, with the information attributed to chance subtracted."""
+    """(parameters,): standard errors from the information matrix, with the information attributed to chance
+    subtracted."""
     numbers = at.hypothesis.numbers
     first = len(products) - len(numbers)
     chance = _weight(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))

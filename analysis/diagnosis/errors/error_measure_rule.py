@@ -25,10 +25,11 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
-from analysis.diagnosis.data.growth_rate import free_motion_rates, is_unstable_within
 from analysis.diagnosis.data.measured_motion import has_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
+from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.settings import DIES_OUT_SHARE, MOST_LEFT_OUT, REST_S, REST_SHARE, SETTLED_CONSTANTS
+from equalizer.plant.linear_simulation import free_motion_rates
 from equalizer.plant.mechanical_model import MechanicalModel
 
 Measure = Literal["free simulation", "windows", "predicted force"]

@@ -122,7 +122,7 @@ def without_claim(whole: Hypothesis, number: int) -> Hypothesis:
 
 def move_point(hypothesis: Hypothesis, step: FloatArray, straight: bool) -> Hypothesis:
     """The hypothesis with its coordinates moved. straight: values change in proportion to the step also where
-    coordinates are logarithms, and a tenth of them is left at least. Along a valley in which a number of the model
+    coordinates are logarithms, and a tenth of them is left at least. Along a valley in which a parameter of the model
     makes up for one of the effect (two masses), steps of logarithms leave the valley's floor."""
     if not straight:
         return replace(hypothesis, point=hypothesis.point + step)

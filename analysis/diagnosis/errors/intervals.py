@@ -1,9 +1,9 @@
 """The end of a fit, and standard errors that hold where residuals are neither white nor of the assumed variance.
 
-End: a search compares fits at shares of their cost, which with 10^5 samples may leave a number several standard errors
-from the minimum. The final fit goes on until the sum of squares falls by less than `FINISHED`. Its sensitivities are
-central differences: numbers that change the prediction alike (a mass that was added, and the model's own) must have
-proportional columns, and the curvature in one-sided differences would count as information that separates them.
+End: a search compares fits at shares of their cost, which with 10^5 samples may leave a parameter several standard
+errors from the minimum. The final fit goes on until the sum of squares falls by less than `FINISHED`. Its sensitivities
+are central differences: parameters that change the prediction alike (a mass that was added, and the model's own) must
+have proportional columns, and the curvature in one-sided differences would count as information that separates them.
 
 Noise: sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches longer than the residuals'
 correlation time. Where a drive repeats, so does what a model cannot reproduce: the same stretch of all periods of a
@@ -23,7 +23,7 @@ import numpy.typing as npt
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.output_error import MOVED, Fitted, Sensitivity, residuals_to_fit, take_step
+from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted, Sensitivity, residuals_to_fit, take_step
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.noise.periods import settled_periods
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
@@ -52,7 +52,7 @@ only error; and under effects with thresholds or solved forces, whose own errors
 def sensitivity_to_all(
     measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis, map_: Mapper = map
 ) -> Sensitivity:
-    """Sensitivity (t + numbers, samples) to the model's parameters, then to the hypothesis's numbers, by central
+    """Sensitivity (t + parameters, samples) to the model's parameters, then to the hypothesis's parameters, by central
     differences; one-sided at a bound and where the other side gives no valid model."""
     t, placed = len(deviations), hypothesis.placed_effects()
     linear = all(isinstance(each.effect.acts, Structure) for each in placed)
@@ -87,7 +87,7 @@ def sensitivity_to_all(
 def _both_ways(hypothesis: Hypothesis, number: int, finer: float) -> tuple[float, float]:
     """Steps down and up within the bounds. number: of the hypothesis; below 0: of the model."""
     if number < 0:
-        return -finer * MOVED, finer * MOVED
+        return -finer * DIFFERENCE_STEP, finer * DIFFERENCE_STEP
     (low, high), at = hypothesis.numbers[number].bounds, hypothesis.point[number]
     step = finer * hypothesis.numbers[number].move
     return max(-step, low - at), min(step, high - at)
@@ -100,7 +100,7 @@ def finish_fit(
     sensitivity_of: Callable[[Fitted], Sensitivity],
     time_left: TimeBudget,
 ) -> tuple[Fitted, Sensitivity]:
-    """The fit at its minimum, and the sensitivity to all its numbers there. sensitivity_of: as `sensitivity_to_all`;
+    """The fit at its minimum, and the sensitivity to all its parameters there. sensitivity_of: as `sensitivity_to_all`;
     computed once, and again after steps that lowered the sum of squares by more than `FINISHED`, also where no time is
     left for further steps."""
     known, samples = sensitivity_of(fitted), len(residuals_to_fit(measure, fitted.residuals))
@@ -122,7 +122,7 @@ def finish_fit(
 
 
 def _normal_equations(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> tuple[FloatArray, FloatArray]:
-    """Normal matrix and right side of a Gauss-Newton step in all numbers, with the calibration as observations."""
+    """Normal matrix and right side of a Gauss-Newton step in all parameters, with the calibration as observations."""
     rhs, t = known.on(residuals_to_fit(measure, fitted.residuals)), len(fitted.deviations)
     rhs[:t] -= fitted.deviations
     return _with_calibration(known.squares, t), rhs
@@ -136,8 +136,8 @@ def _with_calibration(squares: FloatArray, t: int) -> FloatArray:
 
 
 def standard_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray:
-    """(t + numbers,): standard errors of the deviations and of the hypothesis's point; 0 for numbers at a bound. known:
-    sensitivity to all numbers (`sensitivity_to_all`).
+    """(t + parameters,): standard errors of the deviations and of the hypothesis's point; 0 for parameters at a bound.
+    known: sensitivity to all parameters (`sensitivity_to_all`).
 
     Scores sum to zero at the minimum, so that few clusters show too little: the larger of the errors with and without
     periods in one cluster is taken."""
@@ -154,7 +154,7 @@ def standard_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -
 
 
 def segment_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray | None:
-    """(t + numbers,): jackknife standard errors over segments; None where there is one segment. known: as above."""
+    """(t + parameters,): jackknife standard errors over segments; None where there is one segment. known: as above."""
     errors, free = residuals_to_fit(measure, fitted.residuals), _free(fitted)
     products, scores = [], []
     for begin, end in _segments(measure):
@@ -185,14 +185,15 @@ def _segments(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
 
 
 def _free(fitted: Fitted) -> Mask:
-    """(t + numbers,): whether a number is not at one of its bounds; the model's parameters always count."""
+    """(t + parameters,): whether a parameter is not at one of its bounds; the model's parameters always count."""
     point, ends = fitted.hypothesis.point, [number.bounds for number in fitted.hypothesis.numbers]
     away = [not np.isclose(at, of, rtol=0.0, atol=AT_AN_END).any() for at, of in zip(point, ends, strict=True)]
     return np.array([True] * len(fitted.deviations) + away, dtype=np.bool_)
 
 
 def _scores(measure: ErrorMeasure, known: Sensitivity, errors: FloatArray, folded: bool) -> FloatArray:
-    """(t + numbers, clusters): score of each number (column times residual), summed per cluster. folded: as below."""
+    """(t + parameters, clusters): score of each parameter (column times residual), summed per cluster. folded: as
+    below."""
     sums: list[FloatArray] = []
     first = 0
     for record in measure.records:

@@ -7,6 +7,7 @@ from equalizer.signals.recording import Recording
 
 
 def hypothesis_of_law(law: Law, axis: int, recording: Recording) -> Hypothesis:
-    """Hypothesis with a single claim, the law on axis (or channel) `axis`, which starts from the law's own numbers."""
+    """Hypothesis with a single claim, the law on axis (or channel) `axis`, which starts from the law's own
+    parameters."""
     effect = law_effect(law, law_channels(recording))
     return hypothesis_of_claim(Claim(effect, "one", (axis,)), [law_values(law)])

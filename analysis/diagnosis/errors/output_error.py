@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.data.growth_rate import is_unstable_within
+from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis, move_point
 from analysis.diagnosis.errors.tuning import Tuning
@@ -32,7 +32,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
-MOVED = 0.1
+DIFFERENCE_STEP = 0.1
 """Step of the finite differences, in standard deviations."""
 Dampings = Sequence[tuple[float, bool]]
 """Shares of the normal matrix's diagonal that are added, and whether the step is one of values (`move_point`)."""
@@ -43,7 +43,7 @@ LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """Sensitivity of the prediction to the model's own parameters, or to all numbers, on the samples to fit."""
+    """Sensitivity of the prediction to the model's own parameters, or to all parameters, on the samples to fit."""
 
     at: FloatArray
     """(t,): deviations (standard deviations of the calibration) at which it was computed."""
@@ -119,7 +119,7 @@ def sensitivity(
     base = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.placed_effects()))
 
     def moved(number: int) -> FloatArray:
-        for move in (MOVED, -MOVED):
+        for move in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
             there = at.copy()
             there[number] += move
             try:
@@ -252,7 +252,7 @@ def _longest_s(measure: ErrorMeasure) -> float:
 def hypothesis_sensitivity(
     measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray, map_: object = map
 ) -> FloatArray:
-    """(numbers, samples): sensitivity of the prediction to the hypothesis's parameters."""
+    """(parameters, samples): sensitivity of the prediction to the hypothesis's parameters."""
     model: MechanicalModel = tuning.tune(from_.deviations)
     moves = [number.move for number in from_.hypothesis.numbers]
 

@@ -77,7 +77,7 @@ def choose_structure(
         return Choice(best, tried, text, remains(None, best))
     best = choose_plainest(fits)
     reason = (
-        f"{best.kind} is the structure of fewest numbers from which no other takes "
+        f"{best.kind} is the structure of fewest parameters from which no other takes "
         f"{100 * RICHER_STRUCTURE_GAIN:.0f} % of the error power, fold by fold."
     )
     return _with_modes(Choice(best, tried, reason, remains(given, best)), recordings, on_progress)

@@ -10,7 +10,8 @@ from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
 from analysis.diagnosis.data.recorded_conditions import has_carried_weight
-from analysis.diagnosis.first_model.model_from_balance import FirstModel, plain_model
+from analysis.diagnosis.first_model.first_model import FirstModel
+from analysis.diagnosis.first_model.model_from_balance import plain_model
 from analysis.diagnosis.first_model.model_structures import (
     HELD_FIXED,
     Kind,
@@ -34,7 +35,7 @@ RIGID_REMARK = (
 )
 BALANCE_REMARK = (
     "No model was given. One body per axis, with damping and a spring, was fitted first to the forces along the "
-    "measured motion; its numbers are left open by a tenth, and by half of what the named laws change in them."
+    "measured motion; its parameters are left open by a tenth, and by half of what the named laws change in them."
 )
 UNTIMED_REMARK = (
     "No model was given, and no time is known: a spring per axis was fitted first to the forces along the positions. "

@@ -13,8 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.band import band_end_hz
 from analysis.diagnosis.balance.motion import differentiate
-from analysis.diagnosis.data.force_driven import is_driven
-from analysis.diagnosis.data.measured_motion import FREE, fill_gaps, is_quasi_static
+from analysis.diagnosis.data.measured_motion import FREE, fill_gaps, is_driven, is_quasi_static
 from analysis.diagnosis.data.observed import moving_spans
 from analysis.diagnosis.data.observed_parts import parts_of
 from analysis.diagnosis.settings import DECAY_LEAST_CYCLES, DECAY_MOST_LEVELS

@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
-from analysis.diagnosis.data.force_driven import is_driven
+from analysis.diagnosis.data.measured_motion import is_driven
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.settings import DERIVATIVE_NEEDED
 from analysis.wording import conjoin

@@ -49,7 +49,7 @@ class _Parametrisation:
 
     columns: list[int]
     rows: tuple[FloatArray, ...]
-    """Per axis (columns, numbers)"""
+    """Per axis (columns, parameters)"""
     entries: tuple[tuple[Part, int, int], ...]
 
 
@@ -103,7 +103,7 @@ def _parametrisation(regression: Regression, parts: Sequence[Part]) -> _Parametr
 def _products(
     blocks: Sequence[Sequence[Block]], shape: _Parametrisation, powers: Sequence[float]
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Normal equations of the joint numbers, per block."""
+    """Normal equations of the joint parameters, per block."""
     found = []
     for each in zip(*blocks, strict=True):
         count = shape.rows[0].shape[1]
@@ -121,7 +121,7 @@ def _solve(products: tuple[FloatArray, FloatArray]) -> FloatArray:
 
 
 def _standard_errors(own: Sequence[tuple[FloatArray, FloatArray]], whole: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """Standard errors of the numbers."""
+    """Standard errors of the parameters."""
     found = _solve(whole)
     size = np.sqrt(np.maximum(np.diagonal(whole[0]), 1e-300))
     inverse = np.linalg.inv(whole[0] / np.outer(size, size)) / np.outer(size, size)

@@ -1,7 +1,6 @@
 """Makes a linear model of a force balance: one body per command."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,17 +11,6 @@ from analysis.diagnosis.settings import FOUND_NUMBERS_OPEN, MASSLESS_SHARE
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FirstModel:
-    """Force balances and first model that a diagnosis starts from where no model was given."""
-
-    model: MechanicalModel
-    remarks: tuple[str, ...]
-    """Remarks about it."""
-    balances: tuple[Balance, ...] | None = None
-    """Force balances; None = not computed."""
 
 
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:

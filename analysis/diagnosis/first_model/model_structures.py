@@ -53,7 +53,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StructureFit:
-    """A structure fitted to recordings: the model, its numbers and its held-out errors."""
+    """A structure fitted to recordings: the model, its parameters and its held-out errors."""
 
     kind: Kind
     model: MechanicalModel
@@ -113,9 +113,9 @@ def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
         fit = joint_fit(given.regressions, parts)
         model = _model(given, fit, kind)
     except np.linalg.LinAlgError as problem:
-        raise StructureRefused("the motion does not tell its numbers apart") from problem
+        raise StructureRefused("the motion does not tell its parameters apart") from problem
     except MechanicalModelError as problem:
-        raise StructureRefused(f"its numbers are no mechanism: {problem}") from problem
+        raise StructureRefused(f"its parameters are no mechanism: {problem}") from problem
     names = given.recording.command.channels
     return StructureFit(
         kind,
@@ -151,7 +151,7 @@ def fit_modal_structure(
     return StructureFit(
         kind,
         model,
-        _modal_numbers(replace(fit.model, units=model.units), first),
+        _modal_parameters(replace(fit.model, units=model.units), first),
         errors,
         channels,
         MOTION,
@@ -238,7 +238,7 @@ def _numbers(
     )  # fmt: skip
 
 
-def _modal_numbers(model: MechanicalModel, recording: Recording) -> tuple[Number, ...]:
+def _modal_parameters(model: MechanicalModel, recording: Recording) -> tuple[Number, ...]:
     along, found = driven_axes(model), []
     own = model.tolerance or Tolerance()
     spread = (own.mass_kg, own.damping_n_s_per_m, own.stiffness_n_per_m)

@@ -10,8 +10,6 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.judged_law import NO_COLUMN
-from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.motion import Motion, motion_signal
 from analysis.diagnosis.data.observed_parts import parts_of
 from equalizer.signals.recording import Hold, Recording
@@ -21,17 +19,12 @@ from equalizer.signals.unit_system import system_of
 
 def is_reduced(balances: Sequence[Balance]) -> bool:
     """Whether the balances hold more than one body per command, and no law of a command, which acts on all of it."""
-    if any(each.place == NO_COLUMN for balance in balances for each in balance.named):
+    if not all(each.has_column for balance in balances for each in balance.named):
         return False
     motion = balances[0].search.regression.motions[0]
     if len(motion.channels) > len(balances) or motion.order == 2:
         return True
-    return any(linear_laws(balance) or balance.search.regression.beside.delay_s for balance in balances)
-
-
-def linear_laws(balance: Balance) -> tuple[Law, ...]:
-    """Linear laws beside mass, damping and stiffness, of the base and of the chosen structure."""
-    return (*balance.search.regression.beside.laws, *(each.law for each in balance.laws if each.law.linear))
+    return any(balance.linear_laws or balance.search.regression.beside.delay_s for balance in balances)
 
 
 def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
@@ -75,7 +68,7 @@ def _force_beside(balance: Balance, motion: Motion) -> FloatArray:
     # The constant of the base is left to the fit.
     weights = np.delete(weights, regression.base - 1)
     motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
-    whole = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in linear_laws(balance))])
+    whole = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in balance.linear_laws)])
     others = d > motion.force.shape[1]
     kept = [k >= regression.matrices or (others and k % d != regression.beside.own) for k in range(whole.shape[1])]
     return np.asarray(whole[:, kept] @ weights[: whole.shape[1]][kept])

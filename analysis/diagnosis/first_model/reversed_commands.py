@@ -17,18 +17,13 @@ import numpy as np
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.balance.structures import Structure, is_better
-from analysis.diagnosis.data.force_driven import all_as_force_driven
-from analysis.diagnosis.data.measured_motion import is_read_as_free
+from analysis.diagnosis.data.measured_motion import all_as_force_driven, is_read_as_free
 from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.recorded_conditions import REVERSED
 from analysis.diagnosis.settings import REVERSED_SIGN_GAIN
 from analysis.wording import conjoin
-from equalizer.effects.command_sign import with_reversed_commands
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
-
-REVERSED = "turned commands"
-"""Key of a recording's `meta`: channels of its commands that were reversed."""
 
 
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
@@ -59,18 +54,6 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
         f"taking it. The sign was turned round, and a model that is written has it in its input matrix; where the "
         f"device is a source of work, say so by a model of your own."
     )
-
-
-def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
-    """The model driven by the commands as they were recorded. model: of the recording as it is compared, where commands
-    may have been reversed, and a free motion has the force per unit mass as its command."""
-    if is_read_as_free(recording):
-        return replace(model, mass=np.eye(len(model.mass)))
-    channels, turned = recording.command.channels, recording.meta.get(REVERSED)
-    if not isinstance(turned, Sequence) or not set(turned) & set(channels):
-        return model
-    signs = [-1.0 if channel in turned else 1.0 for channel in channels]
-    return with_reversed_commands(model, signs, channels, recording.response.channels)
 
 
 def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:

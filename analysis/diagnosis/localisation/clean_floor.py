@@ -4,7 +4,7 @@ evidence for an effect."""
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from analysis.diagnosis.data.frequency_cells import Band
+from analysis.diagnosis.data.spectral_lines import Band
 from analysis.diagnosis.settings import LEARNED_TOO_MUCH
 from analysis.wording import conjoin
 

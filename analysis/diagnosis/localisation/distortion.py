@@ -7,9 +7,15 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import DetectionLines, detection_lines, hold_length
-from analysis.diagnosis.data.frequency_cells import Band, lines_in_band, octaves_between
-from analysis.diagnosis.data.line_statistics import excess
+from analysis.diagnosis.data.spectral_lines import (
+    Band,
+    DetectionLines,
+    detection_lines,
+    excess,
+    hold_length,
+    lines_in_band,
+    octaves_between,
+)
 from analysis.diagnosis.localisation.segment_spectra import SegmentSpectrum, segment_spectra
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import Fitted, gather_evidence
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.forces.transfer import axis_transfer
+from analysis.diagnosis.forces.missing_force import axis_transfer
 from analysis.diagnosis.localisation.distortion import Distortions
 from analysis.diagnosis.localisation.entry_point import Entry, EntryPoint, entry_point
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, Prediction

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.frequency_cells import Band
-from analysis.diagnosis.data.line_statistics import noncentral_f_sf
+from analysis.diagnosis.data.spectral_lines import Band, noncentral_f_sf
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, residual_lines
 from analysis.diagnosis.noise.noise_floor import NoiseFloor

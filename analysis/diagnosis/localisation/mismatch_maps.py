@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc, fdtrc, stdtr
 
-from analysis.diagnosis.data.frequency_cells import Band
+from analysis.diagnosis.data.spectral_lines import Band
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import FitScore

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analysis.diagnosis.data.frequency_cells import Band
+from analysis.diagnosis.data.spectral_lines import Band
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.localisation.state_regions import StateRegion

@@ -6,8 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import detection_lines, hold_length
-from analysis.diagnosis.data.frequency_cells import Band, find_driven_inputs, lines_in_band, octaves_between
+from analysis.diagnosis.data.spectral_lines import (
+    Band,
+    detection_lines,
+    find_driven_inputs,
+    hold_length,
+    lines_in_band,
+    octaves_between,
+)
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, mean_spectrum, settled_periods, spectra
 from analysis.diagnosis.types import Mask

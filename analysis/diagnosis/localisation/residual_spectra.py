@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import detection_lines, hold_length
+from analysis.diagnosis.data.spectral_lines import detection_lines, hold_length
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.detection_lines import DetectionLines
-from analysis.diagnosis.data.frequency_cells import find_driven_inputs
+from analysis.diagnosis.data.spectral_lines import DetectionLines, find_driven_inputs
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, period_spectra
 from equalizer.identification.frequency_response.experiments import instrument_signal

@@ -18,7 +18,7 @@ import numpy as np
 from analysis.diagnosis.data.recorded_conditions import add_mass
 from analysis.diagnosis.document import NextExperiment
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.output_error import MOVED, Fitted
+from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.next_experiment.experiment_menu import Experiment
 from analysis.diagnosis.settings import TELLING_GAIN
@@ -58,8 +58,8 @@ class PredictedGain:
 def predict_gains(
     bench: Bench, named: Fitted, rival: Fitted, known: FloatArray, menu: Sequence[Experiment]
 ) -> tuple[PredictedGain, ...]:
-    """The experiments with their gains, in the menu's order. known: (t + numbers, t + numbers), information matrix of
-    the rival's numbers from what has been recorded, calibration included."""
+    """The experiments with their gains, in the menu's order. known: (t + parameters, t + parameters), information
+    matrix of the rival's parameters from what has been recorded, calibration included."""
     return tuple(PredictedGain(experiment, *_gains(bench, named, rival, known, experiment)) for experiment in menu)
 
 
@@ -145,8 +145,9 @@ def _gains(
     columns = []
     for number in range(len(rival.deviations)):
         there = rival.deviations.copy()
-        there[number] += MOVED
-        columns.append((_simulate(bench, there, rival.hypothesis, rival.hypothesis.point, experiment) - base) / MOVED)
+        there[number] += DIFFERENCE_STEP
+        moved = _simulate(bench, there, rival.hypothesis, rival.hypothesis.point, experiment)
+        columns.append((moved - base) / DIFFERENCE_STEP)
     for number, of in enumerate(rival.hypothesis.numbers):
         point = rival.hypothesis.point.copy()
         point[number] += of.move
@@ -165,7 +166,7 @@ def _squares_after_retuning(
     bench: Bench, rival: Fitted, known: FloatArray, seen: tuple[Experiment, FloatArray, FloatArray]
 ) -> float:
     """Sum of squares that remains after the rival is re-tuned, by Gauss-Newton steps. seen: the experiment, the
-    difference to be tuned away, and the sensitivities to the rival's numbers."""
+    difference to be tuned away, and the sensitivities to the rival's parameters."""
     experiment, differs, moves = seen
     tuned, t = np.zeros(len(known)), len(rival.deviations)
     wanted = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + differs

@@ -26,7 +26,7 @@ MOST_RIVALS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
-    """What the menu can tell of the rivals that the data do not distinguish from what is named."""
+    """Recordings of the menu that would distinguish the named effect from its rivals, with what each would gain."""
 
     names: tuple[str, ...]
     """What is named, then its rivals."""

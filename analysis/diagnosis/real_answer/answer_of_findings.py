@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.effect_words import numbers_text
+from analysis.diagnosis.effect_words import parameters_text
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation_words import localisation_sentences
 from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, HeldOutStretch, OwnNumber, RealAnswer
@@ -66,14 +66,14 @@ def answer_of_findings(
 
 
 def named_sentences(found: Findings) -> tuple[str, ...]:
-    """Each effect with its numbers, and what these data cannot tell from it."""
+    """Each effect with its parameters, and what these data cannot tell from it."""
     single = found.given.inputs == 1
     return tuple(
         " ".join(
             filter(
                 None,
                 (
-                    f"{capitalise(effect_title(effect, single))}, {numbers_text(effect.effect, effect.parameters)}.",
+                    f"{capitalise(effect_title(effect, single))}, {parameters_text(effect.effect, effect.parameters)}.",
                     inseparable_sentence(effect),
                 ),
             )
@@ -144,7 +144,7 @@ def _change(series: TimeSeries, start: int, stop: int) -> FloatArray:
     return np.asarray(np.nan_to_num(np.abs(series.retuned - series.after)[start:stop] / size))
 
 
-# The simple model's own numbers after a diagnosis, with their intervals, where it is one body.
+# The simple model's own parameters after a diagnosis, with their intervals, where it is one body.
 def own_numbers(found: Findings, nominal: Mapping[str, float]) -> tuple[OwnNumber, ...]:
     """Mass, damping and stiffness of one body; none where there are more. nominal: by these words, SI.
 

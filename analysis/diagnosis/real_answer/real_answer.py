@@ -75,7 +75,7 @@ class PairOutcome:
     after: str
     verdict: Outcome
     named: tuple[str, ...]
-    """Effects, each as a reader calls it with its numbers."""
+    """Effects, each as a reader calls it with its parameters."""
     returned: tuple[str, ...]
     """Names of the vocabulary: what was named, and what these data cannot tell from it."""
     as_before: float | None
@@ -139,7 +139,7 @@ class RealAnswer:
     candidates: tuple[Candidate, ...] = ()
     """The best that were not confirmed, the first first;"""
     not_confirmed: tuple[str, ...] = ()
-    """each as a sentence with its numbers, but for one that `answer` says."""
+    """each as a sentence with its parameters, but for one that `answer` says."""
 
 
 def real_answer_to_json(answer: RealAnswer) -> dict[str, Any]:

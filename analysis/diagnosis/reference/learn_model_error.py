@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.choose_measure import MeasureChoice, measure_of
-from analysis.diagnosis.errors.coloured_measure import (
-    ColouredMeasure,
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.errors.tuning import Tuning, tuning_of
+from analysis.diagnosis.errors.whitened_measure import (
+    WhitenedMeasure,
     WhiteningFilter,
     whiten_measure,
     whitening_filter,
 )
-from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.tuning import Tuning, tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, learn_floor
 from analysis.diagnosis.localisation.mismatch_maps import cells_of
@@ -62,7 +62,7 @@ class LearnedError:
     """(c,): rms of the whitened residual over the signal's; see `_signal`."""
     references: ReferenceRecordings
 
-    def noise_measure(self, measure: ErrorMeasure, model: MechanicalModel) -> ColouredMeasure:
+    def noise_measure(self, measure: ErrorMeasure, model: MechanicalModel) -> WhitenedMeasure:
         """The error measure of the recordings to diagnose, with this residual as coloured noise."""
         return whiten_measure(measure, self.whitening, self.share * _signal(measure, measure.residuals(model, ())))
 

@@ -128,8 +128,8 @@ def _judge_with_floor(measure: ErrorMeasure, found: Explanation, named: bool, be
 
 
 def _refit_by(context: SearchContext, found: Explanation) -> Explanation:
-    """The explanation with its numbers refitted on the plain residual: effects are chosen on the whitened one, where a
-    law that is not exact would be biased by frequencies with little weight."""
+    """The explanation with its parameters refitted on the plain residual: effects are chosen on the whitened one, where
+    a law that is not exact would be biased by frequencies with little weight."""
     after = found.after.fitted
     if after.hypothesis.claims and not context.certain:
         start = evaluate_fit(context.measure, context.tuning, after.deviations, after.hypothesis)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import is_quasi_static
+from analysis.diagnosis.data.recorded_conditions import as_recorded
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.first_model.reversed_commands import as_recorded
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, clean_floor_sentence
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, mismatch_maps, whole_mismatch
@@ -120,7 +120,7 @@ def _split_s(measure: ErrorMeasure) -> dict[str, float]:
 
 
 def _standard_errors(result: SearchResult) -> FloatArray:
-    """Standard errors of the model's own numbers, then of the named effects'; NaN where none is shown. See
+    """Standard errors of the model's own parameters, then of the named effects'; NaN where none is shown. See
     `final_errors`."""
     context, found = result.context, result.found
     own, numbers = len(context.tuning.names), len(found.after.fitted.hypothesis.point)
@@ -160,7 +160,7 @@ def _document(
 
 
 def _interval_errors(result: SearchResult, errors: FloatArray) -> FloatArray:
-    """(numbers,): standard errors of the named effects' numbers for the intervals that are stated."""
+    """(parameters,): standard errors of the named effects' parameters for the intervals that are stated."""
     own = len(result.context.tuning.names)
     if result.found.statistic is not None:
         return INTERVAL_FACTOR * errors[own:]

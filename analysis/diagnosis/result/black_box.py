@@ -88,7 +88,7 @@ def _term_count(base: FloatArray) -> int:
 
 
 def _terms(base: FloatArray, numbers: Sequence[int]) -> FloatArray:
-    """(n, numbers): some of the terms. base: (n, 2 signals)."""
+    """(n, parameters): some of the terms. base: (n, 2 signals)."""
     width = base.shape[1]
     products = list(combinations(range(width // 2), 2))
     found = np.empty((len(base), len(numbers)))

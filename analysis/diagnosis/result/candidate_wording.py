@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.document import Candidate, Diagnosis, Estimate, NamedEffect
-from analysis.diagnosis.effect_words import PLAYED_AS_FORMULA, noun_of, numbers_text, place_words, unit_of
+from analysis.diagnosis.effect_words import PLAYED_AS_FORMULA, noun_of, parameters_text, place_words, unit_of
 from analysis.diagnosis.unit_wording import share_text
 from analysis.wording import capitalise, end_sentence
 from equalizer.signals.unit_system import UnitSystem
@@ -85,7 +85,7 @@ def class_sentence(effect: NamedEffect) -> str:
     title = family[1] if family is not None else "one of several laws that these data cannot tell apart"
     return (
         f"{capitalise(title)}: {', '.join(map(noun_of, names[:-1]))} or {noun_of(names[-1])} would each explain it as "
-        f"well on held-out data. The numbers are those of {noun_of(names[0])}."
+        f"well on held-out data. The parameters are those of {noun_of(names[0])}."
     )
 
 
@@ -113,11 +113,11 @@ def _family(names: Sequence[str]) -> tuple[str, str] | None:
 def candidate_title(candidate: Candidate, device: Device | None = None) -> str:
     """A candidate with its place and parameters."""
     place = place_words(candidate.place, candidate.axis, device is not None and device.single)
-    numbers = candidate_numbers(candidate, device)
+    numbers = candidate_parameters(candidate, device)
     return f"{noun_of(candidate.effect)} {place}{f', {numbers}' if numbers else ''}"
 
 
-def candidate_numbers(candidate: Candidate, device: Device | None = None) -> str:
+def candidate_parameters(candidate: Candidate, device: Device | None = None) -> str:
     """device: None = not known, and so are the units: bare SI numbers."""
     if device is None:
         text = ", ".join(
@@ -125,7 +125,7 @@ def candidate_numbers(candidate: Candidate, device: Device | None = None) -> str
         )
         return f"{text} (SI)" if text else ""
     units = {name: unit_of(candidate.effect, name, device.system) for name in candidate.parameters}
-    return numbers_text(candidate.effect, {k: Estimate(v, units[k]) for k, v in candidate.parameters.items()})
+    return parameters_text(candidate.effect, {k: Estimate(v, units[k]) for k, v in candidate.parameters.items()})
 
 
 def candidate_sentences(diagnosis: Diagnosis, device: Device | None = None) -> tuple[str, ...]:

@@ -4,19 +4,22 @@ gain of all laws together."""
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.judged_law import NO_COLUMN, JudgedLaw
-from analysis.diagnosis.confirm.confirm_laws import CONSTANTS
+from analysis.diagnosis.confirm.require_gain import CONSTANTS
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
 from analysis.diagnosis.effect_words import noun_of, place_of
-from analysis.diagnosis.first_model.reduced_recordings import linear_laws
 from analysis.diagnosis.result.candidate_wording import REFINED
 from analysis.diagnosis.result.findings import BalanceErrors
 from analysis.diagnosis.settings import FURTHER_LAW_GAIN, LAW_OF_CEILING
 from analysis.wording import conjoin
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.placing import axis_letter
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.balance.judge_laws import Balance
+    from analysis.diagnosis.balance.judged_law import JudgedLaw
+
 
 _NAME, _FREE, _OWN_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
 _NUMBER = re.compile(r"(?<![A-Za-z_\d])\d[\d.]*(?:[eE][+-]?\d+)?")
@@ -28,7 +31,7 @@ REFINING = {
     "drifting_force": ("constant_force",),
 }
 """Laws that are not simulated, and the special cases that each contains."""
-PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further numbers are open"
+PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further parameters are open"
 ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
 """With a single measured response, a late command and a late reading are equivalent."""
@@ -39,7 +42,7 @@ BEYOND = "a mode, lag or relaxation that the model lacks: linear dynamics, which
 
 def beside_given(
     diagnosis: Diagnosis,
-    balances: Sequence[Balance],
+    balances: "Sequence[Balance]",
     unconfirmed: Sequence[Candidate],
     channels: tuple[str, ...],
 ) -> Diagnosis:
@@ -80,7 +83,7 @@ def _class_of(effect: NamedEffect, alike: tuple[str, ...]) -> tuple[str, ...]:
 
 def with_balances(
     diagnosis: Diagnosis,
-    balances: Sequence[Balance],
+    balances: "Sequence[Balance]",
     channels: tuple[str, ...],
     unconfirmed: Sequence[Candidate] = (),
 ) -> Diagnosis:
@@ -120,8 +123,8 @@ def with_balances(
 
 
 def _weighed_law(
-    effect: NamedEffect, weighed: Sequence[tuple[JudgedLaw, str, float]]
-) -> tuple[JudgedLaw, float] | None:
+    effect: NamedEffect, weighed: "Sequence[tuple[JudgedLaw, str, float]]"
+) -> "tuple[JudgedLaw, float] | None":
     """The law of a balance that an effect was named after, and its share of the mismatch. weighed: with axis and
     share."""
     for law, axis, share in weighed:
@@ -145,7 +148,7 @@ def _names_covered_by(effect: NamedEffect) -> tuple[str, ...]:
     return (effect.effect, *effect.class_, *refined)
 
 
-def _rank(weighed: JudgedLaw) -> int:
+def _rank(weighed: "JudgedLaw") -> int:
     """Order of candidates: physics with a significant gain and possible parameters first; then a linear model of a
     higher order; and last laws that explain almost nothing."""
     if weighed.law.linear:
@@ -155,13 +158,15 @@ def _rank(weighed: JudgedLaw) -> int:
     return 0 if weighed.possible and (weighed.gain_low > 0 or weighed.agreed) else 1
 
 
-def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...], in_samples: bool = False) -> tuple[str, ...]:
+def linear_remarks(
+    balances: "Sequence[Balance]", channels: tuple[str, ...], in_samples: bool = False
+) -> tuple[str, ...]:
     """Remarks on the first model's linear terms beside mass, damping and stiffness; channels: of the commands.
     in_samples: samples are counted as time."""
     texts = []
     for channel, balance in zip(channels, balances, strict=False):
         beside, motion = balance.search.regression.beside, balance.search.regression.motions[0]
-        laws = [law.effect for law in linear_laws(balance)]
+        laws = [law.effect for law in balance.linear_laws]
         late = f"{beside.delay_s:.3g} samples" if in_samples else f"{1e3 * beside.delay_s:.3g} ms"
         parts = [f"a command that is {late} late (a lag or a delay)"] if beside.delay_s else []
         parts += [noun_of(name) for name in dict.fromkeys(laws)]
@@ -178,7 +183,7 @@ def linear_remarks(balances: Sequence[Balance], channels: tuple[str, ...], in_sa
 
 
 def balance_errors(
-    diagnosis: Diagnosis, balances: Sequence[Balance], channels: tuple[str, ...]
+    diagnosis: Diagnosis, balances: "Sequence[Balance]", channels: tuple[str, ...]
 ) -> tuple[BalanceErrors, ...]:
     """Errors of each axis's balance with the laws that the document names; see `with_balances`."""
     found = []
@@ -201,13 +206,13 @@ def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     return tuple(first.values())
 
 
-def _explained_share(balance: Balance, law: JudgedLaw) -> float:
+def _explained_share(balance: "Balance", law: "JudgedLaw") -> float:
     """Share of the linear model's held-out error power that goes with a law; its own is of what all laws take."""
-    whole = 1.0 if law.place == NO_COLUMN else 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2
+    whole = 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2 if law.has_column else 1.0
     return min(max(whole * law.share, 0.0), 1.0)
 
 
-def _with_class(effect: NamedEffect, found: tuple[JudgedLaw, float] | None) -> NamedEffect:
+def _with_class(effect: NamedEffect, found: "tuple[JudgedLaw, float] | None") -> NamedEffect:
     """found: the law as it was weighed, and its share of the mismatch."""
     if found is None:
         late = effect.effect in LATE
@@ -237,7 +242,7 @@ def refines(effect: str, plain: str) -> bool:
     return plain in known
 
 
-def _candidate(weighed: JudgedLaw, axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
+def _candidate(weighed: "JudgedLaw", axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
     """effects: those that are named."""
     plainer = any(refines(weighed.law.effect, named.effect) and named.axis == axis for named in effects)
     why_not = PLAINER if plainer else "simulations of the whole recording do not bear it out"

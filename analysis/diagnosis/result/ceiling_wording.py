@@ -18,7 +18,7 @@ def black_box_sentence(box: BlackBox | None, named: bool) -> str:
     if box is None:
         return ""
     physics = "the physics" if named else "the re-tuned model"
-    fitted = f"A black box ({box.kind}, {box.numbers} numbers), fitted to the same samples, leaves"
+    fitted = f"A black box ({box.kind}, {box.numbers} parameters), fitted to the same samples, leaves"
     errors = f"{error_of_signal(box.test)} on the held-out data; {physics} leaves {error_text(box.physics)}"
     if black_box_beats(box):
         return f"{fitted} {errors}. The black box predicts better: the data hold something that was not named."

@@ -11,8 +11,6 @@ IMPACTS_COMPARED = (
     "differ by, at least 5 %, stands where the noise stands otherwise. No black box was fitted beside: it would have "
     "to predict each impact."
 )
-BY_CHANCE = "what chance makes of it"
-BY_NOISE = "the noise"
 
 
 def impact_sentence(diagnosis: Diagnosis, named: str) -> str:

@@ -5,10 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.document import Estimate, NamedEffect, Rival
+from analysis.diagnosis.document import Estimate, FoundLaw, NamedEffect, Rival, found_law
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis
-from analysis.diagnosis.found_law import FoundLaw, found_law
-from analysis.diagnosis.result.impact_wording import BY_CHANCE, BY_NOISE
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand, only_refines
 from analysis.diagnosis.search.search_context import FittedCandidate
@@ -31,6 +29,9 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
+
+BY_CHANCE = "what chance makes of it"
+BY_NOISE = "the noise"
 
 _SAME_ERROR = 0.005
 """Relative difference below which two errors count as the same."""
@@ -62,7 +63,7 @@ def labels_of(recording: Recording, model: MechanicalModel) -> Labels:
 
 
 def named_effects(found: Explanation, errors: FloatArray, labels: Labels) -> tuple[NamedEffect, ...]:
-    """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (numbers,), standard
+    """The effects of the final hypothesis with parameters, rivals and probabilities. errors: (parameters,), standard
     errors of the hypothesis's point for its intervals (`interval_errors`)."""
     whole, named, first = found.after.fitted.hypothesis, [], 0
     shares = shares_taken(found.retuned, found.steps)
@@ -147,14 +148,14 @@ def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: t
 
 def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, labels: Labels) -> dict[str, Estimate]:
     claim = whole.claims[number]
-    at = reported_numbers(whole, number, whole.point)
+    at = reported_parameters(whole, number, whole.point)
     spread = {name: 0.0 for name in at}
     for coordinate in range(own.start, own.stop):
         if not np.isfinite(errors[coordinate]):
             continue
         moved = whole.point.copy()
         moved[coordinate] += errors[coordinate]
-        for name, value in reported_numbers(whole, number, moved).items():
+        for name, value in reported_parameters(whole, number, moved).items():
             spread[name] += (value - at[name]) ** 2
     units = _units(claim.effect, at, labels)
     return {
@@ -173,7 +174,7 @@ def _units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
 
 
 def law_of_claim(whole: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:
-    """The discovered law of a claim, with its fitted numbers, as the document writes it; None for an effect of the
+    """The discovered law of a claim, with its fitted parameters, as the document writes it; None for an effect of the
     catalogue. axis: replaces that of the law."""
     law = whole.claims[number].effect.law
     if law is None:
@@ -187,7 +188,7 @@ def _interval(value: float, standard_error: float) -> tuple[float, float] | None
     return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
 
 
-def reported_numbers(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
+def reported_parameters(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
     """Parameters as the vocabulary defines them: of the first site, or of the largest for effects in `LARGEST`."""
     groups = _groups(whole, number, point)
     claim = whole.claims[number]

@@ -15,7 +15,7 @@ _LISTED = 4
 
 
 @dataclass(frozen=True, slots=True)
-class MovedNumber:
+class MovedParameter:
     """A parameter of the model that a fit moved, with its change."""
 
     name: str
@@ -39,23 +39,23 @@ class MovedNumber:
         return f"{sign}{size}"
 
 
-def all_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
+def all_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
     """deviations: (parameters,)"""
     return tuple(
-        MovedNumber(name, float(change), unit, float(deviation))
+        MovedParameter(name, float(change), unit, float(deviation))
         for name, change, unit, deviation in zip(
             tuning.names, tuning.values(deviations), tuning.units, deviations, strict=True
         )
     )
 
 
-def moved_numbers(tuning: Tuning, deviations: FloatArray) -> tuple[MovedNumber, ...]:
+def moved_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
     """Parameters that moved by a standard deviation or more, the largest first. deviations: (parameters,)"""
-    moved = [number for number in all_numbers(tuning, deviations) if abs(number.deviations) >= RETUNING_NAMED]
+    moved = [number for number in all_parameters(tuning, deviations) if abs(number.deviations) >= RETUNING_NAMED]
     return tuple(sorted(moved, key=lambda number: -abs(number.deviations)))
 
 
-def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
+def retuned_sentence(moved: Sequence[MovedParameter], fitted: bool = False) -> str:
     """Sentence on the parameters that were re-tuned beside named physics. fitted: the model was fitted to the same
     recordings first, so that no calibration holds its parameters."""
     if not moved:
@@ -64,23 +64,22 @@ def retuned_sentence(moved: Sequence[MovedNumber], fitted: bool = False) -> str:
     more = len(moved) - _LISTED
     sentence = conjoin([*texts, f"{more} more"] if more > 0 else texts)
     if fitted:
-        return (
-            f"Fitted once more, these numbers of the first model moved by more than was left open at first: {sentence}."
-        )
+        beyond = "these parameters of the first model moved by more than was left open at first"
+        return f"Fitted once more, {beyond}: {sentence}."
     return f"Re-tuned beyond the calibration's standard deviation: {sentence}."
 
 
-def doubtful_sentences(moved: Sequence[MovedNumber], fitted: bool = False) -> tuple[str, ...]:
+def doubtful_sentences(moved: Sequence[MovedParameter], fitted: bool = False) -> tuple[str, ...]:
     """Sentence on parameters that left the likely range of their calibration: they may compensate for physics that was
     not named. Many are only counted, because the table of parameters lists all. fitted: as in `retuned_sentence`."""
     far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
     at_end = [number for number in far if abs(number.deviations) >= RETUNING_BOUND - 1e-6]
     if fitted:
         names = conjoin([number.name for number in at_end])
-        return (f"As far as they may, these numbers of the first model moved: {names}.{_OPEN}",) if at_end else ()
+        return (f"As far as they may, these parameters of the first model moved: {names}.{_OPEN}",) if at_end else ()
     if len(far) > _LISTED:
         return (
-            f"{len(far)} numbers were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or more"
+            f"{len(far)} parameters were moved by {RETUNING_DOUBTED:g} standard deviations of their calibration or more"
             f"{f', {len(at_end)} of them as far as they may' if at_end else ''}: "
             "either the calibration is wrong, or they stand for physics that was not named.",
         )
@@ -118,5 +117,6 @@ def raised_sentence(errors: Errors) -> str:
         return ""
     return (
         f"Re-tuning raises the error on held-out data from {error_text(errors.before)} to {error_text(errors.retuned)} "
-        "of the signal: what was fitted to differs from what was kept for the test, and re-tuned numbers are doubtful."
+        "of the signal: what was fitted to differs from what was kept for the test, and re-tuned parameters are "
+        "doubtful."
     )

@@ -51,7 +51,7 @@ def _what(factor: float) -> str:
 
 
 def constant_sentence(model: MechanicalModel) -> str:
-    """A sentence about the unit of all numbers where the commands are no forces; else empty."""
+    """A sentence about the unit of all parameters where the commands are no forces; else empty."""
     system = model.system
     if system.known:
         return ""

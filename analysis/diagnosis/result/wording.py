@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
-from analysis.diagnosis.effect_words import OF_THE_WHOLE, noun_of, numbers_text, place_words
-from analysis.diagnosis.found_law import law_text
+from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect, law_text
+from analysis.diagnosis.effect_words import OF_THE_WHOLE, noun_of, parameters_text, place_words
 from analysis.diagnosis.result.candidate_wording import (
     REFINED,
     Device,
@@ -25,11 +24,11 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import impact_sentence
 from analysis.diagnosis.result.plausibility import implausible_sentences
 from analysis.diagnosis.result.retuned_parameters import (
-    MovedNumber,
+    MovedParameter,
     better_alone,
     better_model,
     doubtful_sentences,
-    moved_numbers,
+    moved_parameters,
     raised_sentence,
     retuned_sentence,
 )
@@ -53,14 +52,14 @@ def effect_title(effect: NamedEffect, single: bool = False) -> str:
 
 
 def effect_sentence(effect: NamedEffect, signature: str = "", single: bool = False) -> str:
-    """An effect with its numbers. signature: what it causes in the data, as the catalogue says it."""
+    """An effect with its parameters. signature: what it causes in the data, as the catalogue says it."""
     if effect.law is not None:
         signature = "; ".join(filter(None, (law_text(effect.law), signature)))
-    text = ", ".join(filter(None, (effect_title(effect, single), numbers_text(effect.effect, effect.parameters))))
+    text = ", ".join(filter(None, (effect_title(effect, single), parameters_text(effect.effect, effect.parameters))))
     return f"{capitalise(text)}: {signature}." if signature else f"{capitalise(text)}."
 
 
-def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), device: Device | None = None) -> str:
+def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedParameter] = (), device: Device | None = None) -> str:
     """The whole answer, first thing to be read; where nothing is named, with the best candidate."""
     single = device is not None and device.single
     errors = diagnosis.fit.test
@@ -75,7 +74,7 @@ def verdict_sentence(diagnosis: Diagnosis, moved: Sequence[MovedNumber] = (), de
             else ", each within its calibration's standard deviation"
         )
         fall = fall_text(errors, ("before", "as given"), ("retuned", "re-tuned"), how)
-        return f"No physics is missing; numbers of the model are off{off}. {capitalise(fall)}."
+        return f"No physics is missing; parameters of the model are off{off}. {capitalise(fall)}."
     if diagnosis.effects:
         fall = capitalise(fall_text(errors, better_model(errors), ("after", "with it"), how))
         if not significant(diagnosis.remainder):
@@ -96,7 +95,9 @@ def answer_of(found: Findings) -> str:
         return impact_sentence(
             diagnosis, conjoin([effect_title(effect, device.single) for effect in diagnosis.effects])
         )
-    return verdict_sentence(diagnosis, final_moved_numbers(found) if diagnosis.verdict == "parameters" else (), device)
+    return verdict_sentence(
+        diagnosis, final_moved_parameters(found) if diagnosis.verdict == "parameters" else (), device
+    )
 
 
 def device_of(found: Findings) -> Device:
@@ -197,7 +198,7 @@ def gain_sentence(effect: NamedEffect) -> str:
 def summary_lines(found: Findings) -> tuple[str, ...]:
     """The diagnosis in a few sentences, the verdict first."""
     diagnosis, single = found.diagnosis, found.given.inputs == 1
-    moved = final_moved_numbers(found)
+    moved = final_moved_parameters(found)
     lines = [answer_of(found)]
     signatures = signature_texts(found)
     for effect in diagnosis.effects:
@@ -222,11 +223,11 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
     return tuple(line for line in lines if line)
 
 
-def final_moved_numbers(found: Findings) -> tuple[MovedNumber, ...]:
-    """The model's own numbers as they stand in the end, those that moved furthest first."""
+def final_moved_parameters(found: Findings) -> tuple[MovedParameter, ...]:
+    """The model's own parameters as they stand in the end, those that moved furthest first."""
     if found.tuning is None:
         return ()
-    return moved_numbers(found.tuning, found.explanation.after.fitted.deviations)
+    return moved_parameters(found.tuning, found.explanation.after.fitted.deviations)
 
 
 def signature_texts(found: Findings) -> Mapping[str, str]:

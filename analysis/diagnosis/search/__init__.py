@@ -4,7 +4,6 @@
 `screening` ranks, `search_context` holds what all fits share and makes the first fits, `compare_candidates` fits the
 best to the end, `parsimony` chooses. Where the drive repeats, ranks and first fits are those of one period of each
 segment (`short_recordings`). `identifiability` and `revise_selection` take out or exchange what the data do not fix or
-need;
-`verdict` says what may be claimed. `guard` keeps the crash of an effect from ending it all, `time_budget` ends it
+need; `verdict` says what may be claimed. `guard` keeps the crash of an effect from ending it all, `time_budget` ends it
 early; `impacts` is for rattling play. Begin at `search.py`.
 """

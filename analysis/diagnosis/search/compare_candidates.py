@@ -5,7 +5,7 @@ g2 min(g2 / g1, 1). A fit ends when that is below a tolerance (`output_error.exp
 model's own parameters costs one simulation each; it is kept from fit to fit, and recomputed only where a parameter has
 moved far from where it was computed. So all candidates can be compared at a small part of the cost of full fits, and
 only those within reach of the best are refined. Under forces that depend on the motion, a sensitivity without these, or
-of one period, ends short of the minimum: what is refined is polished with that of all numbers on all samples.
+of one period, ends short of the minimum: what is refined is polished with that of all parameters on all samples.
 """
 
 from collections.abc import Sequence
@@ -42,9 +42,9 @@ MOST_POLISHED, POLISHED = 3, 0.002
 """Times at most that fits are polished, and share of the cost that must be gained to go on; each takes a simulation for
 every number of the model. By hand."""
 MOST_REFRESHED, CONVERGED, CONVERGED_FAR, STALE = 4, 0.0005, 0.01, 0.5
-"""The sensitivity to the model's numbers is recomputed so often, or until that gains no more than such a share, or, far
-above the noise, such a share of the logarithm of the error; and only where one of the numbers has moved by so many
-standard deviations since, for it costs a simulation for each."""
+"""The sensitivity to the model's parameters is recomputed so often, or until that gains no more than such a share, or,
+far above the noise, such a share of the logarithm of the error; and only where one of the parameters has moved by so
+many standard deviations since, for it costs a simulation for each."""
 
 
 def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitted]) -> tuple[FittedCandidate, ...]:
@@ -81,15 +81,15 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
 
 
 def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
-    """The fits continued with the sensitivity of all numbers under the forces of the first, which they share, and again
-    while that gains, at noise too: a fit that leaves hardly more may still be two standard deviations off. fits: of
-    laws that do nearly the same, the best first; where that leaves noise alone, those that leave much more are given
+    """The fits continued with the sensitivity of all parameters under the forces of the first, which they share, and
+    again while that gains, at noise too: a fit that leaves hardly more may still be two standard deviations off. fits:
+    of laws that do nearly the same, the best first; where that leaves noise alone, those that leave much more are given
     up. Without such forces they are complete."""
     measure, tuning = context.measure, context.tuning
     if not any(has_motion_forces(law.hypothesis) for law in fits):
         return fits
-    if _left(context, fits[0]) <= NO_SECOND_START and any(_left(context, law) > REACHES_NOISE for law in fits):
-        near = [law for law in fits if _left(context, law) <= REACHES_NOISE]
+    if _error_of(context, fits[0]) <= NO_SECOND_START and any(_error_of(context, law) > REACHES_NOISE for law in fits):
+        near = [law for law in fits if _error_of(context, law) <= REACHES_NOISE]
         return sorted([*_polish(context, near), *(law for law in fits if law not in near)], key=lambda law: law.cost)
     for _ in range(MOST_POLISHED):
         try:
@@ -107,7 +107,7 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
     return fits
 
 
-def _left(context: SearchContext, law: Fitted) -> float:
+def _error_of(context: SearchContext, law: Fitted) -> float:
     """Error of the worst channel, times the noise."""
     return context.candidate(law).score.worst_channel
 

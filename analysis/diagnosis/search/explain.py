@@ -72,7 +72,7 @@ class Statistic:
     chance: FloatArray
     """(c,): its usual difference between two simulations of one model; takes the place of the noise."""
     errors: FloatArray
-    """(numbers,): standard errors of the final hypothesis's point."""
+    """(parameters,): standard errors of the final hypothesis's point."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,11 +96,11 @@ class Explanation:
     barred: str = ""
     """An effect that was not to be named, where nothing but refinements of it explains as much."""
     undetermined: tuple[str, ...] = ()
-    """Effects that were found, and are not named: the recordings leave their numbers open."""
+    """Effects that were found, and are not named: the recordings leave their parameters open."""
     errors: tuple[Fitted, FloatArray] | None = None
-    """A fit, and the standard errors of all its numbers, where they were computed already; as `final_errors`."""
+    """A fit, and the standard errors of all its parameters, where they were computed already; as `final_errors`."""
     between: tuple[Fitted, FloatArray | None] | None = None
-    """A fit at its minimum, and what its numbers vary between segments (`segment_errors`)."""
+    """A fit at its minimum, and what its parameters vary between segments (`segment_errors`)."""
 
     @property
     def plain(self) -> FittedCandidate:

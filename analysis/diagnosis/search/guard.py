@@ -53,17 +53,17 @@ class Guard:
         if not self.on:
             return map_
 
-        def mapped(function: Callable[..., object], items: Iterable[object]) -> Iterable[object]:
+        def guarded_map(function: Callable[..., object], items: Iterable[object]) -> Iterable[object]:
             @wraps(function)
-            def kept(item: object) -> tuple[object, ...] | Crash:
+            def guard_item(item: object) -> tuple[object, ...] | Crash:
                 return _try(_effect_of(item), doing, lambda: function(item))
 
-            results: list[tuple[object, ...] | Crash] = list(map_(kept, items))  # type: ignore[arg-type]
+            results: list[tuple[object, ...] | Crash] = list(map_(guard_item, items))  # type: ignore[arg-type]
             # Noted here, for it may have happened in another process.
             self.crashes.extend(found for found in results if isinstance(found, Crash))
             return [result for found in results if not isinstance(found, Crash) for result in found]
 
-        return mapped
+        return guarded_map
 
     def part(
         self,
@@ -84,10 +84,10 @@ class Guard:
     def parts(self, map_: Mapper, pieces: Sequence[Part]) -> list[Any]:
         """The results of independent pieces of work."""
 
-        def tried(piece: Part) -> tuple[Any] | Crash:
+        def try_part(piece: Part) -> tuple[Any] | Crash:
             return _try(piece.what, piece.doing, piece.work) if self.on else (piece.work(),)
 
-        results: list[tuple[Any] | Crash] = list(map_(tried, pieces))  # type: ignore[arg-type]
+        results: list[tuple[Any] | Crash] = list(map_(try_part, pieces))  # type: ignore[arg-type]
         self.crashes.extend(found for found in results if isinstance(found, Crash))
         return [
             piece.instead if isinstance(found, Crash) else found[0]
@@ -127,4 +127,4 @@ def _effect_of(item: object) -> str:
         return item.name
     hypothesis = item if isinstance(item, Hypothesis) else getattr(item, "hypothesis", None)
     claims = () if hypothesis is None else hypothesis.claims
-    return claims[-1].effect.name if claims else "the model's own numbers"
+    return claims[-1].effect.name if claims else "the model's own parameters"

@@ -41,14 +41,14 @@ _ABSENT = 1e-9
 
 
 def number_errors(context: SearchContext, found: Explanation) -> FloatArray:
-    """(numbers,): standard errors of the final hypothesis's point."""
+    """(parameters,): standard errors of the final hypothesis's point."""
     if found.statistic is not None:
         return found.statistic.errors
     return final_errors(context, found)[len(context.tuning.names) :]
 
 
 def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
-    """(t + numbers,): standard errors of the final fit, of the model's own deviations first."""
+    """(t + parameters,): standard errors of the final fit, of the model's own deviations first."""
     last = found.steps[-1] if found.steps else found.retuned
     if found.errors is not None and found.errors[0] is last.fitted:
         return found.errors[1]
@@ -56,8 +56,8 @@ def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
 
 
 def interval_errors(context: SearchContext, found: Explanation, noise: FloatArray) -> FloatArray:
-    """(t + numbers,): standard errors for the intervals that are stated. noise: `final_errors`, or their profiles. To
-    these comes what varies between segments, up to a few times the noise's: with few segments a jackknife has heavy
+    """(t + parameters,): standard errors for the intervals that are stated. noise: `final_errors`, or their profiles.
+    To these comes what varies between segments, up to a few times the noise's: with few segments a jackknife has heavy
     tails. A single segment tells nothing of that, and a factor stands for it."""
     last = (found.steps[-1] if found.steps else found.retuned).fitted
     if found.between is not None and found.between[0] is last:
@@ -99,13 +99,13 @@ def _finish(context: SearchContext, fitted: Fitted, time_left: TimeBudget) -> tu
 
 
 def _with_sensitivity(context: SearchContext, last: Fitted) -> tuple[Fitted, Sensitivity]:
-    """The fit on the samples to fit and to choose by, with the sensitivity to all its numbers."""
+    """The fit on the samples to fit and to choose by, with the sensitivity to all its parameters."""
     fitted = evaluate_fit(context.measure, context.tuning, last.deviations, last.hypothesis)
     return fitted, _sensitivity_of(context, fitted)
 
 
 def _sensitivity_of(context: SearchContext, fitted: Fitted) -> Sensitivity:
-    """Sensitivity to all numbers of a fit, on one period of each segment where the drive repeats."""
+    """Sensitivity to all parameters of a fit, on one period of each segment where the drive repeats."""
     short_form = short_recordings_of(context, fitted)
     near = context if short_form is None else short_form.context
     known = sensitivity_to_all(near.measure, near.tuning, fitted.deviations, fitted.hypothesis, near.map_)
@@ -165,7 +165,7 @@ def _with_profile_errors(context: SearchContext, found: Explanation, time_left: 
         found = finish(context, found, time_left)
     errors = final_errors(context, found).copy()
     first = len(context.tuning.names)
-    for effect, own in enumerate(_numbers_with_none(found, errors[first:])):
+    for effect, own in enumerate(_parameters_with_none(found, errors[first:])):
         refits = effect < len(found.steps) - 1
         if found.statistic is not None or len(own) != 1 or (refits and not time_left()):
             continue
@@ -181,8 +181,8 @@ def _with_profile_errors(context: SearchContext, found: Explanation, time_left: 
     return replace(found, errors=(found.steps[-1].fitted, errors))
 
 
-def _numbers_with_none(found: Explanation, errors: FloatArray) -> Iterator[list[tuple[Number, int, float, float]]]:
-    """Per effect, its numbers that have a value meaning no effect, with place, coordinate and standard error."""
+def _parameters_with_none(found: Explanation, errors: FloatArray) -> Iterator[list[tuple[Number, int, float, float]]]:
+    """Per effect, its parameters that have a value meaning no effect, with place, coordinate and standard error."""
     hypothesis, first = found.after.fitted.hypothesis, 0
     each = list(zip(hypothesis.numbers, range(len(errors)), hypothesis.point.tolist(), errors.tolist(), strict=True))
     for claim in hypothesis.claims:
@@ -193,21 +193,21 @@ def _numbers_with_none(found: Explanation, errors: FloatArray) -> Iterator[list[
 
 
 def open_effects(context: SearchContext, found: Explanation) -> Iterator[bool]:
-    """Whether an effect is open, by effect: the intervals of all its numbers that can mean no effect include it."""
-    for own in _numbers_with_none(found, number_errors(context, found)):
+    """Whether an effect is open, by effect: the intervals of all its parameters that can mean no effect include it."""
+    for own in _parameters_with_none(found, number_errors(context, found)):
         yield bool(own) and all(_is_open(number, at, error) for number, _, at, error in own)
 
 
 def _is_open(number: Number, at: float, error: float) -> bool:
-    """Whether the number's interval contains the value that means no effect. error: standard error of its
-    coordinate `at`."""
+    """Whether the parameter's interval contains the value that means no effect. error: standard error of its coordinate
+    `at`."""
     reach, away = _reach(number, at, error)
     value, none = number.value(at), number.parameter.none or 0.0
     return away <= _ABSENT * max(abs(value), abs(none)) or not reach <= away
 
 
 def _reach(number: Number, at: float, error: float) -> tuple[float, float]:
-    """Half width of the number's interval, and the distance of its value from no effect."""
+    """Half width of the parameter's interval, and the distance of its value from no effect."""
     value, none = number.value(at), number.parameter.none or 0.0
     return 1.96 * INTERVAL_FACTOR * abs(number.value(at + error) - value), abs(value - none)
 
@@ -219,8 +219,8 @@ def distance_from_none(
     excludes no effect. effect: its place."""
     last = found.steps[-1].fitted
     fewer = found.retuned if len(found.steps) == 1 else without_effect(context, found, effect).steps[-1]
-    # The re-tuned model, and at times the last step, is kept as it is on all samples. Both fits end at their minimum: else the difference is not all
-    # the effect's.
+    # The re-tuned model, and at times the last step, is kept as it is on all samples. Both fits end at their minimum:
+    # else the difference is not all the effect's.
     start = evaluate_fit(context.measure, context.tuning, fewer.fitted.deviations, fewer.fitted.hypothesis)
     without = _finish(context, start, time_left)[0]
     with_it = evaluate_fit(context.measure, context.tuning, last.deviations, last.hypothesis)

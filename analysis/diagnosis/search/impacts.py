@@ -39,7 +39,7 @@ SIMULATIONS = 4
 WIDTHS = np.geomspace(0.02, 5.0, 13)
 """Gaps that are tried, over the estimated one."""
 FIRST_ROUNDS, ROUNDS, STEPS = 5, 4, 2
-"""Steps of the first fit, without the model's numbers; linearisations of the last fit; and its steps for each."""
+"""Steps of the first fit, without the model's parameters; linearisations of the last fit; and its steps for each."""
 GAINED = 0.02
 """Relative decrease of the cost that a further linearisation must promise."""
 RIVAL = "loose_joint"
@@ -91,7 +91,7 @@ def _is_model(trial: BandPowerFit) -> bool:
 
 
 def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
-    """The fit of the hypothesis's and the model's numbers together: play changes the sensitivity to the model's."""
+    """The fit of the hypothesis's and the model's parameters together: play changes the sensitivity to the model's."""
     view = _with_chance(view, start)
     best = evaluate_hypothesis(view, start.deviations, start.hypothesis)
     before = 0.0
@@ -108,10 +108,10 @@ def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
 def _with_chance(view: View, at: BandPowerFit) -> View:
     """The view with each band's chance variation between simulations, and averaging over as many."""
 
-    def course(number: int) -> FloatArray:
+    def predict(number: int) -> FloatArray:
         return view.predict(at.deviations, perturb(at.hypothesis, number))
 
-    spread = np.std(np.array(list(view.map_(course, range(SIMULATIONS)))), axis=0, ddof=1)
+    spread = np.std(np.array(list(view.map_(predict, range(SIMULATIONS)))), axis=0, ddof=1)
     return replace(view, spread=spread, ensemble=SIMULATIONS)
 
 
@@ -176,10 +176,10 @@ def _judge(
 def _comparison(context: SearchContext, best: BandPowerFit) -> _Comparison:
     power, model = BandPower(context.whole), context.tuning.tune(best.deviations)
 
-    def course(number: int) -> FloatArray:
+    def predict(number: int) -> FloatArray:
         return power.predict(context.whole.residuals(model, perturb(best.hypothesis, number).placed_effects()))
 
-    first, other = (np.asarray(each) for each in context.map_(course, range(2)))
+    first, other = (np.asarray(each) for each in context.map_(predict, range(2)))
     differ = power.misfits(first - other)
     chance = np.fmax(np.fmax(differ.fit, differ.choose), differ.test)
     return _Comparison(context, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))

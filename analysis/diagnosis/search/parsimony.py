@@ -1,4 +1,4 @@
-"""Parsimony: of explanations about as good, few numbers, a small re-tuning and an unrefined law are preferred."""
+"""Parsimony: of explanations about as good, few parameters, a small re-tuning and an unrefined law are preferred."""
 
 from collections.abc import Sequence
 

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.coloured_measure import ColouredMeasure
 from analysis.diagnosis.errors.fit_score import rms_over
 from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine, hypothesis_of_claim, without_claim
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, gather_evidence, sensitivity
 from analysis.diagnosis.errors.tuning import Tuning
+from analysis.diagnosis.errors.whitened_measure import WhitenedMeasure
 from analysis.diagnosis.search.starting_hypotheses import candidates
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.starts.evidence import Evidence
@@ -26,12 +26,12 @@ SETTLED = 1e-4
 class ReferenceRecording:
     """A clean recording with the model re-tuned to it, on which hypotheses are fitted for comparison."""
 
-    measure: ColouredMeasure
+    measure: WhitenedMeasure
     tuning: Tuning
     base: Fitted
     """Re-tuned, without any effect."""
     known: Sensitivity
-    """Sensitivity to the model's numbers there."""
+    """Sensitivity to the model's parameters there."""
     evidence: Evidence
 
     def gain_on_clean(self, wanted: Hypothesis) -> FloatArray:
@@ -43,11 +43,11 @@ class ReferenceRecording:
         starts.sort(key=lambda fitted: fitted.cost)
         ends = [fit(measure, tuning, start, self.known, ROUNDS) for start in starts[:TRIED]]
         best = min([*ends, self.base], key=lambda fitted: fitted.cost)
-        without, with_it = self._left(self.base), self._left(best)
+        without, with_it = self._channel_rms(self.base), self._channel_rms(best)
         return np.asarray(np.log(without) - np.log(np.maximum(with_it, np.finfo(float).tiny)))
 
     def costs_of(self, fixed: Hypothesis) -> tuple[float, float]:
-        """Cost without and with a hypothesis whose numbers are fixed, the model re-tuned as far in either."""
+        """Cost without and with a hypothesis whose parameters are fixed, the model re-tuned as far in either."""
         start = evaluate_fit(self.measure, self.tuning, self.base.deviations, fixed)
         without, with_it = (fit(self.measure, self.tuning, each, self.known, ROUNDS) for each in (self.base, start))
         return without.cost, with_it.cost
@@ -59,7 +59,7 @@ class ReferenceRecording:
         held = without_claim(wanted, len(wanted.claims) - 1)
         return [wanted, *(combine(held, hypothesis) for hypothesis in own)]
 
-    def _left(self, fitted: Fitted) -> FloatArray:
+    def _channel_rms(self, fitted: Fitted) -> FloatArray:
         masks = [record.fit | record.choose for record in self.measure.records]
         return rms_over(self.measure.records, fitted.residuals, masks)
 
@@ -84,7 +84,7 @@ class ReferenceRecordings:
 
     def hold(self, hypothesis: Hypothesis, claim: int) -> bool:
         """Whether the recordings in order are predicted better with an effect as it was fitted elsewhere, all its
-        numbers included: then it did not come since. claim: which of the hypothesis's effects."""
+        parameters included: then it did not come since. claim: which of the hypothesis's effects."""
         effect = hypothesis.claims[claim].effect
         numbers = tuple(replace(parameter, fixed=True) for parameter in effect.parameters)
         held = replace(hypothesis.claims[claim], effect=replace(effect, parameters=numbers))
@@ -94,7 +94,7 @@ class ReferenceRecordings:
 
 
 def reference_recording(
-    measure: ColouredMeasure, tuning: Tuning, deviations: FloatArray, map_: Mapper
+    measure: WhitenedMeasure, tuning: Tuning, deviations: FloatArray, map_: Mapper
 ) -> ReferenceRecording:
     """deviations: of the model re-tuned to it."""
     known = sensitivity(measure, tuning, deviations, NOTHING, map_)

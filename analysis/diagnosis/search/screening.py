@@ -31,31 +31,31 @@ def screen(
     suggested: Sequence[Hypothesis],
     map_: Mapper,
 ) -> tuple[ScreenedHypothesis, ...]:
-    """The hypotheses with their predicted costs, the best first. known: sensitivity to the model's own numbers."""
+    """The hypotheses with their predicted costs, the best first. known: sensitivity to the model's own parameters."""
     model = tuning.tune(base.deviations)
     errors = residuals_to_fit(measure, base.residuals)
 
-    def foreseen(hypothesis: Hypothesis) -> ScreenedHypothesis:
+    def predict(hypothesis: Hypothesis) -> ScreenedHypothesis:
         whole = combine(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
             there = residuals_to_fit(measure, measure.residuals(model, whole.placed_effects()))
         return ScreenedHypothesis(whole, _predicted_cost(base, known, errors, errors - there))
 
-    found: list[ScreenedHypothesis] = list(map_(foreseen, suggested))  # type: ignore[arg-type]
+    found: list[ScreenedHypothesis] = list(map_(predict, suggested))  # type: ignore[arg-type]
     return tuple(sorted(found, key=lambda screened: screened.cost))
 
 
 def _predicted_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray) -> float:
-    with np.errstate(over="ignore", invalid="ignore"):  # of a course that ran away
+    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
         strength = float(change @ change)
     if not (np.isfinite(strength) and strength > 0):
         return np.inf
     t = len(base.deviations)
     cross = known.on(change)
     products = np.block([[known.squares + np.eye(t), cross[:, None]], [cross[None, :], np.array([[strength]])]])
-    pull = np.concatenate([known.on(errors) - base.deviations, [float(change @ errors)]])
+    gradient = np.concatenate([known.on(errors) - base.deviations, [float(change @ errors)]])
     low = np.concatenate([-RETUNING_BOUND - base.deviations, [WEAKEST_START]])
     high = np.concatenate([RETUNING_BOUND - base.deviations, [STRONGEST_START]])
-    step = bounded_step(products, pull, low, high)
-    gain = 2 * float(step @ pull) - float(step @ products @ step)
+    step = bounded_step(products, gradient, low, high)
+    gain = 2 * float(step @ gradient) - float(step @ products @ step)
     return base.cost - gain / len(errors)

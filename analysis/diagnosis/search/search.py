@@ -290,7 +290,7 @@ def _remarks(found: Explanation) -> tuple[str, ...]:
 
 def _open_sentences(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(
-        f"An explanation by {noun_of(name)} is not named: these recordings leave its numbers as good as open."
+        f"An explanation by {noun_of(name)} is not named: these recordings leave its parameters as good as open."
         for name in dict.fromkeys(names)
     )
 

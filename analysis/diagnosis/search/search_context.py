@@ -55,7 +55,7 @@ class FittedCandidate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchContext:
-    """The measures, the open numbers and the rules that all fits of a search share."""
+    """The measures, the open parameters and the rules that all fits of a search share."""
 
     measure: ErrorMeasure
     """On the samples to fit and to choose by."""
@@ -147,8 +147,8 @@ def first_fits(
 def sensitivity_at(
     context: SearchContext, deviations: np.ndarray, hypothesis: Hypothesis, with_forces: bool = False
 ) -> Sensitivity:
-    """Sensitivity of the prediction to the model's own numbers. Motion-dependent forces are left out first: simulations
-    are quick without them, and small forces hardly change the sensitivity."""
+    """Sensitivity of the prediction to the model's own parameters. Motion-dependent forces are left out first:
+    simulations are quick without them, and small forces hardly change the sensitivity."""
     kept = hypothesis
     for number in reversed(range(len(hypothesis.claims))):
         if isinstance(hypothesis.claims[number].effect.acts, (AxisForce, JointForce)):
@@ -178,11 +178,11 @@ def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedH
     return [entry for _, entry in sorted(ranked, key=lambda pair: pair[0])]
 
 
-# Selects the model's numbers that matter for a force at an axis: those that change how that axis moves.
+# Selects the model's parameters that matter for a force at an axis: those that change how that axis moves.
 def sensitive_parameters(
     measure: ErrorMeasure, tuning: Tuning, plain: Sensitivity, hypothesis: Hypothesis
 ) -> list[int]:
-    """Numbers whose sensitivity changes with the hypothesis's forces: those that move the axes at which these act.
+    """Parameters whose sensitivity changes with the hypothesis's forces: those that move the axes at which these act.
     plain: sensitivity without motion-dependent forces."""
     forces = [
         effect for effect in hypothesis.placed_effects() if isinstance(effect.effect.acts, (AxisForce, JointForce))

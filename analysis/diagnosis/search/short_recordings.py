@@ -11,7 +11,6 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 import numpy.typing as npt
 
-from analysis.diagnosis.data.growth_rate import growth_rate
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
@@ -35,6 +34,7 @@ from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.effects.simulation.bodies import Restarts
 from equalizer.effects.starts.evidence import Evidence
+from equalizer.plant.linear_simulation import growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 

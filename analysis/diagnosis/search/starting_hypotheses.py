@@ -49,13 +49,13 @@ def candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mapper = m
 
 
 def within_data(hypothesis: Hypothesis, evidence: Evidence) -> bool:
-    """Whether the newest effect's numbers lie within what was recorded: no ripple repeats within less than its pitch of
-    travel, no dead band or limit lies beyond the largest command."""
+    """Whether the newest effect's parameters lie within what was recorded: no ripple repeats within less than its pitch
+    of travel, no dead band or limit lies beyond the largest command."""
     return is_within_data(hypothesis, len(hypothesis.claims) - 1, evidence)
 
 
 def is_within_data(hypothesis: Hypothesis, number: int, evidence: Evidence, pitches: float = 1.0) -> bool:
-    """Whether the numbers of the hypothesis's claim `number` lie within what was recorded. pitches: of a ripple that
+    """Whether the parameters of the hypothesis's claim `number` lie within what was recorded. pitches: of a ripple that
     must have been travelled."""
     limits, used = WITHIN.get(hypothesis.claims[number].effect.name, {}), evidence.used > 0
     for placed in hypothesis.of_claim(number):

@@ -44,7 +44,7 @@ def limit_map(map_: Mapper, time_left: TimeBudget) -> Mapper:
         if not time_left():
             raise OutOfTimeError
 
-    def mapped(function: Callable[..., object], *items: Iterable[object]) -> Iterable[object]:
+    def timed_map(function: Callable[..., object], *items: Iterable[object]) -> Iterable[object]:
         begun = asked[0]
 
         @wraps(function)
@@ -62,4 +62,4 @@ def limit_map(map_: Mapper, time_left: TimeBudget) -> Mapper:
             asked[0] += elsewhere
         return [result for result, _ in found]
 
-    return mapped
+    return timed_map

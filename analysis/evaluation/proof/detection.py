@@ -16,13 +16,14 @@ LEAST_DRAWS = 3
 
 @dataclass(frozen=True, slots=True)
 class EffectDraws:
-    """All draws of an effect with their outcomes by strength, and the strength from which an oracle detects it."""
+    """All draws of an effect with their outcomes by strength, and the strength from which an ideal observer detects
+    it."""
 
     effect: str
     draws: tuple[tuple[float, str], ...]
     """Strength (0 to 1) and outcome: right, in the set, missed or invisible; weakest first."""
-    oracle: float | None
-    """Strength from which an oracle detects it; None where too few cases were drawn."""
+    ideal_threshold: float | None
+    """Strength from which an ideal observer detects it; None where too few cases were drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +45,13 @@ def detection_strips(singles: Sequence[Outcome]) -> tuple[EffectDraws, ...]:
     for name in names:
         own = [single for single in singles if single.names[0] == name]
         draws = tuple(sorted((each.strengths[0], classify_outcome(each)) for each in own))
-        found.append(EffectDraws(name, draws, oracle_threshold(own)))
+        found.append(EffectDraws(name, draws, ideal_threshold(own)))
     return tuple(found)
 
 
-def oracle_threshold(draws: Sequence[Outcome]) -> float | None:
-    """The strength (0 to 1) from which an oracle detects an effect, by a line fit: strength is the logarithm of the
-    effect's number, and what it adds grows about as a power of that. None where too few draws tell it."""
+def ideal_threshold(draws: Sequence[Outcome]) -> float | None:
+    """The strength (0 to 1) from which an ideal observer detects an effect, by a line fit: strength is the logarithm of
+    the effect's parameter, and what it adds grows about as a power of that. None where too few draws tell it."""
     known = [(draw.strengths[0], np.log(draw.adds)) for draw in draws if draw.adds > 0]
     strengths = [strength for strength, _ in known]
     if len(known) < LEAST_DRAWS or np.ptp(strengths) == 0:

@@ -67,7 +67,7 @@ class Outcome:
         return self.diagnosis is None or self.left("retuned") > DETECTABLE
 
     @property
-    def seen_by_oracle(self) -> bool:
+    def seen_by_ideal_observer(self) -> bool:
         """Whether the effects show in a simulation of the same device with and without them, before a re-tuned model
         hides part of them."""
         return hypot(1.0, self.adds) > DETECTABLE

@@ -107,7 +107,7 @@ def _single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     sided = [each for each in named if each.right and each.concealed[0].axis is not None and len(each.axes) > 1]
     yield share("axis, of two or three", sided, lambda each: not is_on_other_axis(each))
     singles = _of_kind(outcomes, "single")
-    seen = [single for single in singles if single.seen_by_oracle]
+    seen = [single for single in singles if single.seen_by_ideal_observer]
     yield share("single effects that count as detectable", singles, lambda each: each.detectable)
     yield share("named right, of those that an oracle sees", seen, lambda each: each.right)
     hidden = [outcome for outcome in outcomes if outcome.kind != "nothing" and not outcome.detectable]

@@ -61,7 +61,7 @@ def equalized_findings(
         _edge_coupling(rows),
         _blended_forces(rows),
         _friction(rows),
-        _held_out(held_out),
+        _held_out_finding(held_out),
     )
     return FigureFindings(
         figure=5,
@@ -183,7 +183,7 @@ def _friction(rows: EqualizedRows) -> Finding:
     )
 
 
-def _held_out(held_out: tuple[float, float] | None) -> Finding | None:
+def _held_out_finding(held_out: tuple[float, float] | None) -> Finding | None:
     if held_out is None:
         return None
     error, without = held_out

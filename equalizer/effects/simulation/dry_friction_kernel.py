@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit, types
 
 from equalizer.effects.simulation.instant import F_END, STEP_S, V_FREE, V_PER_N, V
-from equalizer.effects.simulation.linear_step_kernel import BORROWED
+from equalizer.laws.kernel import UNCOUNTED
 from equalizer.signals.signal import FloatArray
 
 LONGEST_M = 50e-9
@@ -67,7 +67,7 @@ def _deflect(
     types.float64(types.float64, types.float64, types.float64, _VECTOR, _VECTOR),
     cache=True,
     error_model="numpy",
-    **BORROWED,
+    **UNCOUNTED,
 )
 def friction_force(forward: float, backward: float, start: float, memory: FloatArray, at: FloatArray) -> float:
     """Mean force over a step of friction with the level `forward` where v > 0 and `backward` where v < 0.
@@ -86,22 +86,36 @@ def friction_force(forward: float, backward: float, start: float, memory: FloatA
         return sliding
     # From here on in units of z_max, the step, and the level.
     step_s = at[STEP_S]
-    v, pull, give = (
+    v, free_change, give = (
         speed * step_s / LONGEST_M,
         (at[V_FREE] - speed) * step_s / LONGEST_M,
         per_newton * level * step_s / LONGEST_M,
     )
     damping = DAMPED / np.sqrt(give)
-    moved = abs(v) + 0.5 * abs(pull - give * start)
+    moved = abs(v) + 0.5 * abs(free_change - give * start)
     parts = min(PARTS, 1 + int(min(moved / STUCK, PARTS)))
     share = 1.0 / parts
-    free, compliance = 0.5 * pull * share**2, 0.5 * give * share**2
+    free, compliance = 0.5 * free_change * share**2, 0.5 * give * share**2
     bend, impulse = start, 0.0
     ends = (forward / level, backward / level)
     for _ in range(parts):
         bend, force = _deflect(bend, v * share + free, compliance, damping * parts, ends)
-        v += (pull - give * force) * share
+        v += (free_change - give * force) * share
         impulse += force
     far = ends[0] if v > 0 else ends[1]
     memory[0], at[F_END] = bend, -level * (bend + (damping * (v - abs(v) * bend / far) if far > 0 else 0.0))
     return -level * impulse * share
+
+
+_PATH = types.Array(types.float64, 1, "A", readonly=True)
+
+
+@njit(types.float64[::1](_PATH, types.float64), cache=True)
+def bristle_bend(position: FloatArray, longest: float) -> FloatArray:
+    """(n,): deflection over `longest`, at which the bristle slips (Dahl's equation). position: (n,), any unit."""
+    bend = np.zeros(position.shape[0])
+    for k in range(1, position.shape[0]):
+        travel = (position[k] - position[k - 1]) / longest
+        full = np.sign(travel)
+        bend[k] = full + (bend[k - 1] - full) * np.exp(-abs(travel))
+    return bend

@@ -1,16 +1,11 @@
 """One step of a linear structure, and many of them without forces, compiled."""
 
-from typing import Any
-
 import numpy as np
 from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 
 FAST = {"reassoc", "contract"}
-BORROWED: Any = {"_nrt": False}
-"""Compiles without reference counts of arrays, which all belong to the caller: their atomic operations took three
-quarters of a step. Such a function allocates nothing."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 

@@ -37,7 +37,8 @@ from equalizer.effects.simulation.instant import (
     V,
     X,
 )
-from equalizer.effects.simulation.linear_step_kernel import BORROWED, FAST, advance_state
+from equalizer.effects.simulation.linear_step_kernel import FAST, advance_state
+from equalizer.laws.kernel import UNCOUNTED
 from equalizer.signals.signal import FloatArray
 
 # Laws are passed as values, so that a changed law is never run from a stale cached kernel; numba calls that
@@ -78,7 +79,7 @@ without forces; forces over the step and at its end."""
 
 def compile_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
     """The law, ready to be called from the kernel. Its machine code is cached beside its own file."""
-    return njit(LAW, cache=True, error_model="numpy", **BORROWED)(law)
+    return njit(LAW, cache=True, error_model="numpy", **UNCOUNTED)(law)
 
 
 class LawAddress(types.WrapperAddressProtocol):
@@ -197,7 +198,7 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
 
 @njit(
     types.void(_LAWS, _PLACES, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _VECTOR),
-    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **BORROWED,
+    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED,
 )  # fmt: skip
 def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
@@ -236,7 +237,7 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
         _LAWS, _PLACES, _VECTOR, _VECTOR, _FOUR, _MATRIX, READ_ONLY, _MATRIX, _VECTOR, _COUNT, types.float64,
         _VECTOR, _VECTOR, _MATRIX, _VECTOR,
     ),
-    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **BORROWED,
+    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED,
 )  # fmt: skip
 def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,

@@ -114,15 +114,17 @@ def likely_oscillators(
         own = shapes - beside @ (beside.T @ shapes)
         size = np.einsum("lt,lt->t", own, own)
         apart = size > SPANNED**2 * np.einsum("lt,lt->t", shapes, shapes)
-        pulls = own[:, apart].T @ alone
-        for each, pull, square in zip(natural[apart].tolist(), pulls, size[apart].tolist(), strict=True):
-            if pull[axis] > 0:
-                explained = float(pull[axis]) ** 2 / square / power
-                found.append(AttachedOscillator(each, ratio, float(pull[axis]) / square, explained, pull / pull[axis]))
+        reactions = own[:, apart].T @ alone
+        for each, reaction, square in zip(natural[apart].tolist(), reactions, size[apart].tolist(), strict=True):
+            if reaction[axis] > 0:
+                explained = float(reaction[axis]) ** 2 / square / power
+                by_axis = reaction / reaction[axis]
+                found.append(AttachedOscillator(each, ratio, float(reaction[axis]) / square, explained, by_axis))
     return sorted((item for item in found if item.explained > CHANCE), key=lambda item: -item.explained)
 
 
 def subtract_oscillator(missing: MissingMass, each: AttachedOscillator) -> MissingMass:
     """The missing force less that of an oscillator."""
-    pull = missing.power * each.mass * oscillator_reaction(missing.frequency_hz, each.natural_hz, each.damping_ratio)
-    return MissingMass(missing.frequency_hz, missing.power, missing.cross - pull[:, None] * each.by_axis)
+    relative = oscillator_reaction(missing.frequency_hz, each.natural_hz, each.damping_ratio)
+    reaction = missing.power * each.mass * relative
+    return MissingMass(missing.frequency_hz, missing.power, missing.cross - reaction[:, None] * each.by_axis)

@@ -18,6 +18,7 @@ class OctaveBins:
     lowest: FloatArray
     """Magnitude of the weakest line of each entry."""
     highest: FloatArray
+    """Magnitude of the strongest line of each entry."""
     noise_variance: FloatArray
     """Noise variance of single lines, averaged."""
     lines: FloatArray

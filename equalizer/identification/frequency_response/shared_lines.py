@@ -87,7 +87,7 @@ def solve_shared_lines(
 
 
 def _columns(experiments: Sequence[Experiment]) -> _Columns:
-    def stacked(name: str) -> ComplexArray:
+    def stack(name: str) -> ComplexArray:
         weighted = [
             getattr(experiment, name).mean(axis=0) * np.sqrt(experiment.length * experiment.effective_periods)
             for experiment in experiments
@@ -95,7 +95,7 @@ def _columns(experiments: Sequence[Experiment]) -> _Columns:
         return np.stack(weighted, axis=2)
 
     power = sum(experiment.length * np.mean(np.abs(experiment.response) ** 2, axis=0) for experiment in experiments)
-    return _Columns(stacked("command"), stacked("response"), stacked("instrument"), np.asarray(power))
+    return _Columns(stack("command"), stack("response"), stack("instrument"), np.asarray(power))
 
 
 def _has_full_rank(columns: _Columns) -> BoolArray:

@@ -120,13 +120,13 @@ def track_under_cap(
 
 def _alternate_directions(task: _CappedTask, start: FloatArray, settings: CapSettings) -> tuple[FloatArray, float, int]:
     """Alternating direction method of multipliers. Returns forces, relative duality gap and rounds."""
-    pull = _initial_penalty(task.problem)
-    gains = _penalised_gains(task.problem, len(task.wanted), pull)
+    weight = _initial_penalty(task.problem)
+    gains = _penalised_gains(task.problem, len(task.wanted), weight)
     z, scaled = task.nearest(start), np.zeros_like(start)
     best, best_cost, bound = z, task.cost(z), -np.inf
     for number in range(1, settings.rounds + 1):
         u = track(gains, np.hstack((task.wanted, z - scaled))).forces
-        bound = max(bound, task.lower_bound(u, 2 * pull * (u - z + scaled)))
+        bound = max(bound, task.lower_bound(u, 2 * weight * (u - z + scaled)))
         relaxed = OVER_RELAXATION * u + (1 - OVER_RELAXATION) * z
         before, z = z, task.nearest(relaxed + scaled)
         scaled = scaled + relaxed - z
@@ -138,8 +138,8 @@ def _alternate_directions(task: _CappedTask, start: FloatArray, settings: CapSet
             return best, gap, number
         factor = _penalty_factor(u - z, z - before) if number % ROUNDS_BETWEEN_TUNING == 0 else 1.0
         if factor != 1.0:
-            pull, scaled = pull * factor, scaled / factor
-            gains = _penalised_gains(task.problem, len(task.wanted), pull)
+            weight, scaled = weight * factor, scaled / factor
+            gains = _penalised_gains(task.problem, len(task.wanted), weight)
     raise TrackingError(
         f"after {settings.rounds} rounds the forces under the cap of {task.cap_n:g} N are only known to be within "
         f"{gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
@@ -158,12 +158,12 @@ def _initial_penalty(problem: TrackingProblem) -> float:
     return float(np.sqrt(max(np.linalg.eigvalsh(problem.R)[0], 1e-6) * max(np.trace(curvature), 1.0)))
 
 
-def _penalised_gains(problem: TrackingProblem, samples: int, pull: float) -> StoredGains:
-    """Gains of the problem with the penalty pull |u - w|²: the forces are further outputs, w is wanted beside r."""
+def _penalised_gains(problem: TrackingProblem, samples: int, weight: float) -> StoredGains:
+    """Gains of the problem with the penalty weight·|u - w|²: the forces are further outputs, w is wanted beside r."""
     p, m = problem.outputs, problem.inputs
     C = np.insert(problem.C, [p] * m, np.zeros((m, problem.order)), axis=0)
     D = np.insert(problem.D, [p] * m, np.eye(m), axis=0)
-    Q = block_diag(problem.Q[:p, :p], pull * np.eye(m), problem.Q[p:, p:])
+    Q = block_diag(problem.Q[:p, :p], weight * np.eye(m), problem.Q[p:, p:])
     return stored_gains(replace(problem, C=C, D=D, Q=Q, outputs=p + m), samples)
 
 

@@ -91,7 +91,7 @@ def costate_feedforward(gains: StoredGains, wanted: FloatArray, final_state: Flo
         raise TrackingError(f"the trajectory has {len(r)} samples, but the gains are for {len(gains)}")
     v = gains.terminal_weight @ problem.state(final_state)
     g = np.empty((len(r), problem.inputs))
-    lqr_kernel.feedforward(problem.joined, r @ problem.pull, gains.gains.K, gains.gains.H_inverse, v, g)
+    lqr_kernel.feedforward(problem.joined, r @ problem.linear_cost, gains.gains.K, gains.gains.H_inverse, v, g)
     return g
 
 

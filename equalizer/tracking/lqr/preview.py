@@ -56,12 +56,12 @@ def preview_tracker(problem: TrackingProblem, preview_samples: int) -> PreviewTr
         raise TrackingError(f"the preview is {preview_samples} samples; the present one at least must be known")
     gains = stationary_gains(problem)
     K, H_inverse = gains.K[0], gains.H_inverse[0]
-    closed, pull = _closed_loop(problem, K)
+    closed, linear = _closed_loop(problem, K)
     ahead = np.empty((preview_samples, problem.inputs, problem.outputs))
-    ahead[0] = H_inverse @ problem.pull[:, problem.order :].T
+    ahead[0] = H_inverse @ problem.linear_cost[:, problem.order :].T
     for j in range(1, preview_samples):
-        ahead[j] = H_inverse @ problem.B.T @ pull
-        pull = closed.T @ pull
+        ahead[j] = H_inverse @ problem.B.T @ linear
+        linear = closed.T @ linear
     return PreviewTracker(problem, K, read_only(ahead))
 
 
@@ -92,7 +92,7 @@ def preview_loss(problem: TrackingProblem, preview_samples: int) -> PreviewLoss:
 def _closed_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, FloatArray]:
     """A - B K, and (C - D K)' Q of the tracked outputs, (n, p)."""
     n = problem.order
-    return problem.A - problem.B @ K, (problem.pull[:, :n] - problem.pull[:, n:] @ K).T
+    return problem.A - problem.B @ K, (problem.linear_cost[:, :n] - problem.linear_cost[:, n:] @ K).T
 
 
 def _closed_response(problem: TrackingProblem, K: FloatArray, z: ComplexArray) -> ComplexArray:
@@ -106,10 +106,10 @@ def _closed_response(problem: TrackingProblem, K: FloatArray, z: ComplexArray) -
 def _full_preview(problem: TrackingProblem, z: ComplexArray) -> ComplexArray:
     """(lines, m, p): feedforward with unlimited preview, the sum over all samples ahead in closed form."""
     gains = stationary_gains(problem)
-    closed, pull = _closed_loop(problem, gains.K[0])
+    closed, linear = _closed_loop(problem, gains.K[0])
     turn = z[:, np.newaxis, np.newaxis]
-    costate = turn * np.linalg.solve(np.eye(problem.order) - turn * closed.T, pull.astype(complex)[np.newaxis])
-    now = problem.pull[:, problem.order :].T
+    costate = turn * np.linalg.solve(np.eye(problem.order) - turn * closed.T, linear.astype(complex)[np.newaxis])
+    now = problem.linear_cost[:, problem.order :].T
     return np.asarray(gains.H_inverse[0] @ (now + problem.B.T @ costate))
 
 

@@ -99,7 +99,7 @@ class TrackingProblem:
         return read_only((cost + cost.T) / 2)
 
     @cached_property
-    def pull(self) -> FloatArray:
+    def linear_cost(self) -> FloatArray:
         """(p, n + m): Q [C D], the linear term of the cost per reference sample."""
         return read_only((self.Q @ np.hstack((self.C, self.D)))[: self.outputs])
 

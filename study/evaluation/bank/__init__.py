@@ -1,5 +1,5 @@
-"""A proof bank: concealed faults are sealed, diagnosed by separate processes without access to the truth, revealed and
-scored.
+"""A bank of a blind test: concealed faults are sealed, diagnosed by separate processes without access to the truth,
+revealed and scored.
 
 `seal_cases` (`proof_folder`, `proof_seals`) -> `ask_engine` (starts `answer_cases` in separate
 processes), `follow_up`, `run_controls` -> `sealed_bank` (checks seals, pairs answers with labels; also for laws) ->

@@ -1,4 +1,4 @@
-"""Folder layout of a proof: open inputs of the diagnosis, sealed truths, results."""
+"""Folder layout of a blind test: open inputs of the diagnosis, sealed truths, results."""
 
 import json
 from dataclasses import dataclass

@@ -1,4 +1,5 @@
-"""Seals of a proof: the hash of every label is written before anything is answered and compared at every later step."""
+"""Seals of a blind test: the hash of every label is written before anything is answered and compared at every later
+step."""
 
 import hashlib
 from pathlib import Path
@@ -75,7 +76,7 @@ def broken_seal_error(names: list[str], path: Path) -> StudyError:
         "A seal is broken",
         f"Of {len(names)} cases ({', '.join(names[:5])}) in {path} the label, the recording or the model is not what "
         "was sealed before the diagnosis.",
-        "Run the bank again in another folder; this one proves nothing.",
+        "Run the bank again in another folder; this one shows nothing.",
         saved="Nothing was changed.",
     )
 

@@ -1,4 +1,4 @@
-"""Summary of a proof for the terminal, misses first."""
+"""Summary of a blind test for the terminal, misses first."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -40,7 +40,7 @@ def control_lines(proof: Proof) -> Iterator[str]:
 
 
 def remarks(proof: Proof) -> Iterator[str]:
-    """What limits this proof: cases left out, or answers from several versions of the code."""
+    """What limits this blind test: cases left out, or answers from several versions of the code."""
     if proof.left_out:
         yield (
             f"{proof.left_out} cases of the second physics engine were left out: MuJoCo is not installed "

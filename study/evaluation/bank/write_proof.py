@@ -1,4 +1,5 @@
-"""Write the results of a proof: a JSON document, a table with one row per case, a page, and a small table to keep."""
+"""Write the results of a blind test: a JSON document, a table with one row per case, a page, and a small table to
+keep."""
 
 import json
 import subprocess

@@ -22,19 +22,22 @@ COUNTS: dict[tuple[Kind, Bank], int] = {
     ("single", "main"): 10, ("single", "dirty"): 4, ("single", "engine"): 4,
     ("pair", "main"): 4, ("outside", "main"): 4, ("without", "main"): 4,
 }  # fmt: skip
+"""Number of devices of each kind and bank in a turn of forty."""
 TURN: tuple[tuple[Kind, Bank], ...] = tuple(each for each, count in COUNTS.items() for _ in range(count))
 EXTRAS: dict[Bank, float] = {"main": 1.0, "dirty": 2.0, "engine": 0.0}
+"""Size of the concealed extras, relative to that of the main bank."""
 LOWEST: dict[Kind, float] = {"nothing": 0.0, "single": 0.0, "pair": 0.4, "outside": 0.3, "without": 0.4}
 """Lowest strength per kind. Single effects range from undetectable to strong; the others test what is said about a
 detectable effect."""
 GOLDEN = 0.5 * (5**0.5 - 1)
+"""Step between strengths of an effect's turns, modulo 1: multiples of the golden ratio fill a range evenly."""
 SIZES = (0.72, 0.14)
 """Fractions of the bank with one and with two driven axes."""
 STEPS = 80
 """Integration steps per sample: enough that the integration error is not what a diagnosis finds."""
 ALL_AXES = ("sensor_misalignment", "cross_axis_sensitivity", "crossed_axes", "extra_mode")
-"""Effects that need three axes to be identifiable: the others' readings, or the direction of a mode, whose pull on one
-axis is that of less mass."""
+"""Effects that need three axes to be identifiable: the others' readings, or the direction of a mode, whose reaction on
+one axis is that of less mass."""
 ONE_ROW = (
     frozenset(name for name in EFFECTS if "friction" in name or name == "presliding_hysteresis"),
     frozenset(("sensor_misalignment", "cross_axis_sensitivity")),
@@ -70,8 +73,8 @@ def draw(seed: int, number: int, brief: bool = False) -> Draw:
     random = np.random.default_rng([seed, 2, number])
     # How many of this kind came before: effects take their turns, and each one's strengths spread evenly.
     before = turn * TURN.count((kind, bank)) + sum(TURN[k] == (kind, bank) for k in order[:place])
-    effects, strengths = _effects(seed, kind, bank, before, random)
-    axes = _axes(effects, random)
+    effects, strengths = _draw_effects(seed, kind, bank, before, random)
+    axes = _draw_axes(effects, random)
     short = len(axes) < 3 or brief
     rig = Rig(axes, 1000 if brief else 2000, 3 if short else 4, EXTRAS[bank], STEPS)
     held = "hand_impedance" in effects
@@ -87,7 +90,7 @@ def case_of(each: Draw, name: str) -> Case:
     return draw_case(each.seed, each.effects, each.concealed, each.strengths or None, name, each.rig)
 
 
-def _effects(
+def _draw_effects(
     seed: int, kind: Kind, bank: Bank, before: int, random: np.random.Generator
 ) -> tuple[tuple[str, ...], tuple[float, ...]]:
     lowest = LOWEST[kind]
@@ -111,10 +114,10 @@ def _draw_pair(random: np.random.Generator) -> tuple[str, str]:
             return first, second
 
 
-def _axes(effects: tuple[str, ...], random: np.random.Generator) -> tuple[int, ...]:
+def _draw_axes(effects: tuple[str, ...], random: np.random.Generator) -> tuple[int, ...]:
     drawn, first = random.random(), int(random.integers(3))
     if "hand_impedance" in effects:
-        first = 0  # its numbers are those of x
+        first = 0  # its parameters are those of x
     if drawn > sum(SIZES) or any(name in ALL_AXES for name in effects):
         return (0, 1, 2)
     if drawn > SIZES[0]:

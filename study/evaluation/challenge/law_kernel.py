@@ -21,9 +21,9 @@ def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, 
     """Force along the row's axis, N. kept: state of a law with memory (`law_memory`)."""
     kind, j, k = int(row[KIND]), int(row[AXIS]), int(row[OTHER])
     if kind >= CROSS_SQUARE:
-        return _across(row, q[j], v[j], q[k], v[k])
+        return _cross_axis_force(row, q[j], v[j], q[k], v[k])
     if kind >= GAIN_RIPPLE:
-        return _with_more(row, q[j], drive[j], kept, t)
+        return _command_or_memory_force(row, q[j], drive[j], kept, t)
     return _own_motion_force(row, q[j], v[j])
 
 
@@ -56,7 +56,7 @@ def _own_motion_force(row: FloatArray, x: float, speed: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _with_more(row: FloatArray, x: float, drive: float, kept: float, t: float) -> float:
+def _command_or_memory_force(row: FloatArray, x: float, drive: float, kept: float, t: float) -> float:
     """Laws of the command, the time or a memory state."""
     kind, first, second = int(row[KIND]), row[FIRST], row[SECOND]
     if kind == GAIN_RIPPLE:
@@ -72,7 +72,7 @@ def _with_more(row: FloatArray, x: float, drive: float, kept: float, t: float) -
 
 
 @njit(cache=True, nogil=True)
-def _across(row: FloatArray, x: float, speed: float, other_x: float, other_speed: float) -> float:
+def _cross_axis_force(row: FloatArray, x: float, speed: float, other_x: float, other_speed: float) -> float:
     """Laws of another axis's motion."""
     kind, side = int(row[KIND]), row[SIDE]
     if kind == CROSS_SQUARE:

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.data.force_driven import all_as_force_driven
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
+from analysis.diagnosis.data.measured_motion import all_as_force_driven
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.prediction_error import PredictionError, prediction_error
-from analysis.diagnosis.first_model.model_from_balance import FirstModel
+from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare

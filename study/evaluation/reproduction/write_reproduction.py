@@ -58,7 +58,7 @@ def write_reproduction_folder(
     )
     document, report = plan.out / REPRODUCTION_NAME, plan.out / PAGE_NAME
     write_reproduction(document, reproduction, origin)
-    page = render_reproduction_report(reproduction, pictures, _shown(origin), local_now())
+    page = render_reproduction_report(reproduction, pictures, _origin_entries(origin), local_now())
     write_text(report, page, overwrite=True)
     on_share(1.0)
     return WrittenReproduction(reproduction, overview_lines(reproduction), document, report)
@@ -97,7 +97,7 @@ def _equalization_findings(results: Results) -> FigureFindings:
     return equalized_findings(results.played.rows, tested, (*results.remarks, *results.played.remarks))
 
 
-def _shown(origin: Provenance) -> dict[str, str]:
+def _origin_entries(origin: Provenance) -> dict[str, str]:
     """Entries of the page's last section."""
     return {
         "recordings": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in origin.parents),

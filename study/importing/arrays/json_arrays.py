@@ -82,7 +82,7 @@ def _arrays(value: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...
     """Arrays by the path of keys that leads to them."""
     match value:
         case dict():
-            yield from _of_object(value, place)
+            yield from _arrays_of_object(value, place)
         case []:
             return
         case [dict(), *_] if all(isinstance(record, dict) for record in value):
@@ -91,7 +91,7 @@ def _arrays(value: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...
             yield place or ("data",), _array(value)
 
 
-def _of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
+def _arrays_of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
     """The array of `{"unit": "N", "values": [...]}`, with its unit in brackets."""
     units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
     lists = [key for key, entry in value.items() if isinstance(entry, list)]

@@ -76,7 +76,7 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
         case PauseTaken():
             return _with_probing(state, after_break(state.sitting.probing, event, state.protocol.probes))
         case ProbePlayed() | ProbeMeasured():
-            return _probe(state, event)
+            return _apply_probe(state, event)
         case FormFilled() | DeviceChecked() | DemoPlayed() | DemoFinished():
             return _apply_preparation(state, event)
         case SessionResumed():
@@ -85,7 +85,7 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
         case PlaceTaken():
             return _take_place(state, event)
         case SessionClosed():
-            return _close(state, event)
+            return _apply_close(state, event)
         case SessionOpened():
             raise LogContradiction("a session cannot be opened twice")
         case _:  # notes and interruptions change nothing
@@ -103,7 +103,7 @@ def _with_probing(state: SessionState, probing: ProbingState) -> SessionState:
     return replace(state, sitting=replace(state.sitting, probing=probing))
 
 
-def _probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> SessionState:
+def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> SessionState:
     """Probes are not played within a trial: the hand must feel the trial's stimulus only."""
     if state.presented is not None:
         raise LogContradiction(f"{event.event} while a trial is open")
@@ -125,7 +125,7 @@ def _take_place(state: SessionState, event: PlaceTaken) -> SessionState:
     return take_place(state, event.participant_number)
 
 
-def _close(state: SessionState, event: SessionClosed) -> SessionState:
+def _apply_close(state: SessionState, event: SessionClosed) -> SessionState:
     if event.outcome != "completed":
         if not state.turned_away_for_good or event.outcome != state.sitting.turned_away:
             raise LogContradiction(f"the session was closed as {event.outcome}, which no form says")

@@ -36,7 +36,7 @@ class UnusableFileError(StudyError):
 
     def __init__(self, path: Path, kind: str, problems: tuple[str, ...], do_now: str = CHECKED) -> None:
         self.kind = kind
-        self.problems = _shown(problems)
+        self.problems = _shorten_problems(problems)
         self.sentences = tuple(_sentence(problem) for problem in self.problems)
         super().__init__(
             title=f"{path.name} is not a usable {kind}",
@@ -84,7 +84,7 @@ class AlreadyThereError(StudyError):
 _PROSE = {"it", "its", "this", "the", "there", "line", "segment", "segments", "effect", "unknown", "column", "and"}
 
 
-def _shown(problems: tuple[str, ...]) -> tuple[str, ...]:
+def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:
     """Shortened: a damaged file may contain a name of a million letters, and a million problems."""
     rest = len(problems) - _MOST_PROBLEMS
     more = (f"and {rest} problems more",) if rest > 0 else ()

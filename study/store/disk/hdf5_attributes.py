@@ -33,7 +33,7 @@ def texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = Non
     found = _value(owner, name)
     values = np.atleast_1d(found).ravel().tolist()
     if not all(isinstance(value, str | bytes) for value in values):
-        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shown(found)}; it must be text")
+        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shorten(found)}; it must be text")
     try:
         # h5py returns bytes that are not UTF-8 as surrogates, which cannot be encoded again.
         texts = tuple(value if isinstance(value, bytes) else value.encode() for value in (*values, name))
@@ -52,7 +52,7 @@ def numbers_attribute(owner: Any, name: str, count: int, default: tuple[float, .
     values = np.atleast_1d(found).ravel()
     if values.dtype.kind not in "iuf" or len(values) != count:
         wanted = "a number" if count == 1 else f"{count} numbers"
-        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shown(found)}; it must be {wanted}")
+        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shorten(found)}; it must be {wanted}")
     return tuple(float(value) for value in values)
 
 
@@ -79,7 +79,7 @@ def _value(owner: Any, name: str) -> Any:
     return owner.attrs[name]
 
 
-def _shown(value: Any) -> str:
+def _shorten(value: Any) -> str:
     text = repr(np.asarray(value).tolist())
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
 

@@ -77,7 +77,7 @@ class HapteqApp(App[None]):
     async def on_mount(self) -> None:
         leave_with_the_terminal(self, lambda: self._leave_app(ExitCode.INTERRUPTED))
         if self._start.first is not None:
-            await self._sit(self._start.first)
+            await self._begin_sitting(self._start.first)
         else:
             await self._archive.home()
         self.call_after_refresh(self._start_the_rest)
@@ -102,7 +102,7 @@ class HapteqApp(App[None]):
         """Of the participant who sits here."""
         return ENGLISH_WORDS if self._sitting is None else self._sitting.words
 
-    async def _sit(self, first: Begin | Resume) -> None:
+    async def _begin_sitting(self, first: Begin | Resume) -> None:
         self._direct = self._direct and first is self._start.first
         self.outcome = self._letting_go = None
         self._archive.clear()
@@ -139,10 +139,10 @@ class HapteqApp(App[None]):
         self._panel(outcome, end.path)
 
     def _panel(self, outcome: Outcome, path: str) -> OutcomeScreen:
-        async def decided(decision: Decision | None) -> None:
+        async def act_on_decision(decision: Decision | None) -> None:
             match decision:
                 case "resume":
-                    await self._sit(Resume(path, self._start.device, self._start.data))
+                    await self._begin_sitting(Resume(path, self._start.device, self._start.data))
                 case "look":
                     self._engine.send(ShowSession(path))
                 case "home":
@@ -151,7 +151,7 @@ class HapteqApp(App[None]):
                     self._leave_app(ExitCode.DONE)
 
         panel = OutcomeScreen(outcome)
-        self.push_screen(panel, decided)
+        self.push_screen(panel, act_on_decision)
         self._keys.forget_earlier()
         return panel
 
@@ -229,12 +229,12 @@ class HapteqApp(App[None]):
             return
         start = self._start = replace(self._start, device=wanted.device)
         order = SessionOrder(wanted.protocol, wanted.device, wanted.subject, start.data, start.seed, wanted.model)
-        await self._sit(Begin(order))
+        await self._begin_sitting(Begin(order))
 
     async def on_resume_wanted(self, wanted: home_messages.ResumeWanted) -> None:
         if self._sitting is not None:
             return
-        await self._sit(Resume(wanted.path, self._start.device, self._start.data))
+        await self._begin_sitting(Resume(wanted.path, self._start.device, self._start.data))
 
     async def on_home_wanted(self) -> None:
         await self._archive.home()

@@ -74,8 +74,8 @@ class ConfirmView(ModalScreen[bool]):
 def confirm_view(app: App[Any], session: str, go_on: Callable[[], object]) -> None:
     """Ask for confirmation. go_on: called once, when the session's name was typed."""
 
-    def decided(confirmed: bool | None) -> None:
+    def act_on_decision(confirmed: bool | None) -> None:
         if confirmed:
             go_on()
 
-    app.push_screen(ConfirmView(session), decided)
+    app.push_screen(ConfirmView(session), act_on_decision)

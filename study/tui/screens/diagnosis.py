@@ -21,7 +21,7 @@ HELP = """\
 Where a model and the device disagree, and why.
 
 * **Verdict**: whether there is a mismatch, and whether it is explained.
-* **Effects**: physics that the model lacks, with its numbers and their 95 % intervals.
+* **Effects**: physics that the model lacks, with its parameters and their 95 % intervals.
 * **Candidates**: physics that would explain some of it and is not confirmed, and why not.
 * **Rivals**: what else was considered, and why not.
 * **Fit**: errors of the given model, after re-tuning its own parameters, and with the effects. *repeats allow* is the

@@ -39,7 +39,7 @@ class PreparingScreen(TranslatedScreen[None]):
         with Vertical() as box:
             box.border_title = self._sentence and self.words["preparing_title"]
             yield Static(self._sentence or SILENT, id="sentence", markup=False)
-            yield Static(self._waited(), id="elapsed", markup=False)
+            yield Static(self._wait_words(), id="elapsed", markup=False)
         footer = Footer(show_command_palette=False)
         footer.display = bool(self._sentence)
         yield footer
@@ -68,9 +68,9 @@ class PreparingScreen(TranslatedScreen[None]):
             box.border_title = self._sentence and self.words["preparing_title"]
 
     def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(self._waited())
+        self.query_one("#elapsed", Static).update(self._wait_words())
 
-    def _waited(self) -> str:
+    def _wait_words(self) -> str:
         return elapsed_words(self._now_s() - self._began_s, self.words) if self._sentence else ""
 
 

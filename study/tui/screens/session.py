@@ -141,11 +141,11 @@ class SessionScreen(Screen[None]):
         open_report(self.app, self._view.report)
 
     def action_withdraw(self) -> None:
-        def decided(erase: bool | None) -> None:
+        def act_on_decision(erase: bool | None) -> None:
             if erase:
                 self.post_message(WithdrawWanted(self._view.line.path))
 
-        self.app.push_screen(WithdrawPrompt(self._view.line.subject), decided)
+        self.app.push_screen(WithdrawPrompt(self._view.line.subject), act_on_decision)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """The footer shows only what this session allows."""

@@ -1,4 +1,4 @@
-"""The daily check: the free device plays what it played when it was accepted, and both recordings are compared."""
+"""The daily check: the free device plays the excitation of its acceptance, and both recordings are compared."""
 
 import contextlib
 import math
@@ -75,7 +75,7 @@ def _baseline_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -
         if each["played_amplitude_n"] < each["requested_amplitude_n"] or each["sensor_clipped"] or each["total_clipped"]
     ]
     found = [f"Sensor or force was at its limit in {len(limited)} of {len(facts)} pieces."] if limited else []
-    # Compared with itself nothing differs: a finding means that it was not measured well enough to detect a later
+    # A recording compared with itself does not differ: a finding means that it is too inaccurate to detect a later
     # change.
     unsure = [finding for finding in change_findings(compare_recordings(recorded, recorded)) if not finding.fine]
     found += [f"Too inaccurate to compare with: {finding.name}, {finding.value}." for finding in unsure]
@@ -231,15 +231,15 @@ def _not_comparable_error(refusal: "NotMeasurableError") -> DeviceError:
 def _plan(name: str, folder: str) -> RecordingPlan:
     place = device_folder() / folder
     place.mkdir(parents=True, exist_ok=True)
-    return RecordingPlan(_protocol(), name, (0.0, 0.0, 0.0), 1, place / f"{name}_{_moment()}.h5")
+    return RecordingPlan(_protocol(), name, (0.0, 0.0, 0.0), 1, place / f"{name}_{_time_stamp()}.h5")
 
 
 def _protocol() -> RecordingProtocol:
     return read_recording_protocol(PROTOCOL).protocol
 
 
-def _moment() -> str:
-    """Names that are sorted as they came."""
+def _time_stamp() -> str:
+    """UTC as text, so that names sort by time."""
     return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
 
 

@@ -4,16 +4,15 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import Compared
-from analysis.diagnosis.first_model.model_from_balance import FirstModel
+from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
@@ -33,6 +32,10 @@ from study.workflows.diagnosis.diagnosis_input import (
     read_input,
 )
 from study.workflows.forked_map import map_forked, processor_s
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.balance.judge_laws import Balance
+
 
 READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
 """Progress after reading, after fitting a model where none was given, and after the diagnosis."""
@@ -131,7 +134,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
         ) from refusal
     except np.linalg.LinAlgError as problem:
         raise not_diagnosable_error(
-            (f"The fits broke down ({problem}): near the given numbers the model runs away from what was recorded",),
+            (f"The fits broke down ({problem}): near the given parameters the model runs away from what was recorded",),
             "State narrower tolerances in the model, or give one that is nearer to the device.",
         ) from problem
     findings = replace(
@@ -181,7 +184,7 @@ def _settings(
     plan: DiagnosePlan,
     found: DiagnosisInput,
     clean: DiagnosisInput | None,
-    balances: tuple[Balance, ...] | None,
+    balances: "tuple[Balance, ...] | None",
 ) -> DiagnosisSettings:
     return DiagnosisSettings(
         without=plan.without,

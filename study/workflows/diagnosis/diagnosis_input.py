@@ -45,7 +45,7 @@ def read_input(
             (f"{folders[0]} is a folder: a session is diagnosed by itself",), "Give recordings, or one session."
         )
     if folders:
-        # Here, for all that reads sessions takes long to import.
+        # Imported here: what reads sessions takes long to import.
         from study.workflows.diagnosis.session_as_recordings import session_recordings
         from study.workflows.diagnosis.session_references import find_references
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.data.recorded_conditions import has_carried_weight
+from analysis.diagnosis.data.recorded_conditions import as_recorded, has_carried_weight
 from analysis.diagnosis.first_model.choose_structure import Choice, choose_structure
 from analysis.diagnosis.first_model.model_structures import KINDS, Kind, Number, StructureRefused
-from analysis.diagnosis.first_model.reversed_commands import as_recorded
 from analysis.diagnosis.result.unit_doubt import constant_sentence
 from analysis.wording import typeset
 from equalizer.plant.mechanical_model import suggest_word

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnosis_settings import BALANCE
 from analysis.diagnosis.first_model import fit_without_model
-from analysis.diagnosis.first_model.model_from_balance import FirstModel
+from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModel

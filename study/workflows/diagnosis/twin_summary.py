@@ -47,13 +47,14 @@ def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
     model, fit, tolerance = written.model, written.fit, written.model.tolerance
     piece = written.piece
     lines = [
-        f"As one piece, up to {piece.up_to_hz:.3g} Hz: mass {_values(piece.mass)} kg{_range(tolerance, 'mass_kg')}, "
-        f"damping {_values(piece.damping)} N s/m, {_values(piece.of_friction)} N s/m of it friction's and taken off"
+        f"As one rigid body, up to {piece.up_to_hz:.3g} Hz: mass {_values(piece.mass)} kg"
+        f"{_range(tolerance, 'mass_kg')}, damping {_values(piece.damping)} N s/m, "
+        f"{_values(piece.of_friction)} N s/m of it friction's and taken off"
         f"{_range(tolerance, 'damping_n_s_per_m')}",
     ]
     if modes := _modes_hz(written):
         swing = ", ".join(f"{each:.3g}" for each in modes)
-        lines.append(f"{model.coordinates} coordinates; what hangs on the driven axes swings at {swing} Hz")
+        lines.append(f"{model.coordinates} coordinates; modes of the bodies on the driven axes: {swing} Hz")
     for error in fit.errors:
         held = "" if error.held_out is None else f", {error.held_out:.1%} on what was kept for a test"
         noise = "" if error.noise is None else f" (noise {error.noise:.1%})"

@@ -27,20 +27,20 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
     improved = replace(findings.improved, provenance=origin.as_dict())
     write_mechanical_model(folder / MODEL_NAME, improved)
     guard = crash_guard()
-    parts = [replace(part, work=partial(_drawn, part.work)) for part in diagnosis_drawings(findings)]
+    parts = [replace(part, work=partial(_draw_pictures, part.work)) for part in diagnosis_drawings(findings)]
     drawn = [each for several in guard.parts(map_forked, parts) for each in several]
     findings = replace(findings, remarks=(*guard.sentences, *findings.remarks))
     write_drawn(folder / "figures", drawn)
-    page = render_diagnosis_report(findings, [each.picture for each in drawn], _shown(origin), local_now())
+    page = render_diagnosis_report(findings, [each.picture for each in drawn], _origin_entries(origin), local_now())
     write_text(folder / PAGE_NAME, page)
     return findings
 
 
-def _drawn(draw: Callable[[], Sequence[Picture]]) -> list[DrawnPicture]:
+def _draw_pictures(draw: Callable[[], Sequence[Picture]]) -> list[DrawnPicture]:
     return [draw_picture(picture) for picture in draw()]
 
 
-def _shown(origin: Provenance) -> dict[str, str]:
+def _origin_entries(origin: Provenance) -> dict[str, str]:
     return {
         "made from": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in origin.parents),
         "command": " ".join(origin.command),

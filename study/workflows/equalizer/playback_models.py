@@ -146,11 +146,11 @@ def _several_places(
     remarks += [_sentence(remark) for remark in dict.fromkeys((*at.remarks, *([outside] if outside else [])))]
     if not choice.checks:
         remarks.append("No place could be held out: what the error is between the models' places is not known.")
-    held_out = tuple(_held_out(check) for check in choice.checks)
+    held_out = tuple(_held_out_sentence(check) for check in choice.checks)
     return PlaybackModels(workspace.models, at, None, choice, tuple(remarks), held_out, _sha256(paths, at_m))
 
 
-def _held_out(check: PlaceCheck) -> str:
+def _held_out_sentence(check: PlaceCheck) -> str:
     modal = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
     return (
         f"Held out {_mm(check.place_m)}: error {100 * check.blended_error:.1f} % (rms over lines) with blended forces, "

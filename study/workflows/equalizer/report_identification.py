@@ -31,7 +31,7 @@ def report_identification(device: IdentifiedDevice, folder: Path, on_progress: C
     pictures = identification_pictures(found)
     write_pictures(folder / "figures", pictures)
     on_progress(0.95)
-    page = render_identification_report(found, pictures, _shown(device), local_now())
+    page = render_identification_report(found, pictures, _origin_entries(device), local_now())
     write_text(folder / PAGE_NAME, page, overwrite=True)
     on_progress(1.0)
     return folder / PAGE_NAME
@@ -66,7 +66,7 @@ def _order(device: IdentifiedDevice, on_progress: Callable[[float], None]) -> Or
         return None
 
 
-def _shown(device: IdentifiedDevice) -> dict[str, str]:
+def _origin_entries(device: IdentifiedDevice) -> dict[str, str]:
     parents = device.model.provenance.get("parents", [])
     return {
         "recordings": ", ".join(f"{parent['file']} ({parent['sha256'][:12]})" for parent in parents),

@@ -73,7 +73,7 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
             linkage.check_frame()
             written = _read(linkage, plan, on_progress)
     except CalibrationError as error:
-        raise _refused(plan.device, error.problems) from error
+        raise _refusal(plan.device, error.problems) from error
     except DeviceError as error:
         error.saved = SAVED
         raise
@@ -195,7 +195,7 @@ def _arrays(readings: list[LinkageReading]) -> dict[str, Any]:
     }
 
 
-def _refused(name: str, problems: tuple[str, ...]) -> DeviceError:
+def _refusal(name: str, problems: tuple[str, ...]) -> DeviceError:
     more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
     return DeviceError(
         TITLE,

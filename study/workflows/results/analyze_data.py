@@ -165,12 +165,12 @@ def _write(
     format_name, version = document.pop("format"), document.pop("version")
     write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
     write_pictures(figures, pictures)
-    shown = _shown(provenance, collected)
+    shown = _origin_entries(provenance, collected)
     page = render_study_report(analysis, pictures, shown, local_now(), shapes, collected.qualities)
     write_text(out / PAGE_NAME, page, overwrite=True)
 
 
-def _shown(provenance: Provenance, collected: CollectedTrials) -> dict[str, str]:
+def _origin_entries(provenance: Provenance, collected: CollectedTrials) -> dict[str, str]:
     """Entries of the report's last section."""
     return {
         "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",

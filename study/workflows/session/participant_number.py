@@ -33,7 +33,7 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
     """
     numbers = []
     for folder in session_folders(data):
-        begun = begun_in(folder)
+        begun = read_begun_participant(folder)
         if begun is None or begun.number is None or (begun.protocol, begun.simulated) != (protocol, simulated):
             continue
         if folder.subject == subject and not folder.withdrawn:
@@ -42,7 +42,7 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
     return max(numbers, default=-1) + 1
 
 
-def begun_in(folder: SessionFolder) -> SessionParticipant | None:
+def read_begun_participant(folder: SessionFolder) -> SessionParticipant | None:
     """What a session folder says about its participant; None if nothing was begun or can be read."""
     if folder.tombstone.exists():
         return read_begun(folder)

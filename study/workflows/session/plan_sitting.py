@@ -10,7 +10,7 @@ from study.store.sessions.archive import SessionFolder, check_subject, session_f
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.equalize_stimuli import check_playable
 from study.workflows.session.open_session import SessionPlan, fresh_seed
-from study.workflows.session.participant_number import begun_in
+from study.workflows.session.participant_number import read_begun_participant
 
 
 def check_code(data: Path, subject: str, simulated: bool) -> None:
@@ -22,7 +22,7 @@ def check_code(data: Path, subject: str, simulated: bool) -> None:
                 f"The participant of {folder.name} withdrew, and the data were erased.",
                 "Use a new code: this one is not given again.",
             )
-        begun = begun_in(folder)
+        begun = read_begun_participant(folder)
         if begun is not None and begun.simulated != simulated:
             whose, other = ("a person", "simulated") if simulated else ("a simulated participant", "a person's")
             raise WrongUseError(

@@ -18,7 +18,7 @@ from study.store.sessions.event_log import LOG_NAME, hold_log_lock
 from study.store.sessions.session_lock import LOCK_NAME, hold_session_lock
 from study.store.sessions.withdrawal_files import WithdrawalIntent, read_intent, write_intent, write_tombstone
 from study.store.sessions.written_elsewhere import folders_written_elsewhere
-from study.workflows.session.participant_number import begun_in
+from study.workflows.session.participant_number import read_begun_participant
 from study.workflows.session.participant_traces import analysis_names, find_traces
 
 ELSEWHERE = "Analyses written elsewhere with --out, and copies, still hold the numbers: erase them."
@@ -90,7 +90,7 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
             for folder in folders:
                 _lock_for_erasing(folder, held)
             earlier = read_intent(data, subject)
-            begun = {folder.name: begun_in(folder) for folder in folders}
+            begun = {folder.name: read_begun_participant(folder) for folder in folders}
             since = earlier.withdrawn_utc if earlier else utc
             write_intent(data, WithdrawalIntent(subject, since, begun, withdrawal.derived))
             for name in withdrawal.derived:

@@ -16,7 +16,7 @@ from study.session.views.participant_codes import next_code
 from study.store.formats.protocol_files import read_study_protocol
 from study.store.sessions.archive import SessionFolder, session_folders
 from study.store.sessions.event_log import read_opening
-from study.workflows.session.participant_number import begun_in, participant_number
+from study.workflows.session.participant_number import participant_number, read_begun_participant
 from study.workflows.views.session_line import session_line
 
 PROGRESS: dict[str, Progress] = {"finished": "done", "unfinished": "begun", "running": "begun"}
@@ -67,7 +67,7 @@ def planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[
 def _find_begun(data: Path, simulated: bool) -> list[_Begun]:
     found = []
     for folder in session_folders(data):
-        begun = begun_in(folder)
+        begun = read_begun_participant(folder)
         if begun is not None and begun.protocol and begun.simulated == simulated:
             found.append(_Begun(folder, begun.protocol, begun.number, session_line(folder), _protocol_text(folder)))
     return found

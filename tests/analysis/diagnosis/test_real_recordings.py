@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.diagnosis.data.force_driven import as_force_driven
+from analysis.diagnosis.data.measured_motion import as_force_driven
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import measure_of

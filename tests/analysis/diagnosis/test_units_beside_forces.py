@@ -1,4 +1,4 @@
-"""Where forces are compared, numbers still carry the units of the motion that was measured."""
+"""Where forces are compared, parameters still carry the units of the motion that was measured."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -7,7 +7,7 @@ import pytest
 from analysis.diagnosis.document import Candidate, Errors, Estimate, Fit, Mismatch, Rival
 from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.wording import final_moved_numbers, summary_lines
+from analysis.diagnosis.result.wording import final_moved_parameters, summary_lines
 from analysis.reports.diagnosis_method import method_paragraphs
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.diagnosis_tables import channel_table, mismatch_table, parameter_table, retuned_table, rival_table
@@ -54,7 +54,7 @@ def test_the_verdict_comes_first_then_the_map_then_a_section_per_effect(page):
     assert page[1].found == [
         "Diagnosis of small", "What the model lacks", "Where model and device disagree",
         "What kind of distortion the device shows", "Dry friction on the x drive",
-        "What else was tried", "How well it predicts", "What is still unexplained", "The model's own numbers",
+        "What else was tried", "How well it predicts", "What is still unexplained", "The model's own parameters",
         "A black box beside it", "The next recording", "Remarks", "How this was done", "Where this comes from",
     ]  # fmt: skip
     assert page[0].index("Missing in the model: dry friction on the x drive. The error") < page[0].index("<h2")
@@ -85,7 +85,7 @@ def test_held_out_data_that_do_not_confirm_stand_in_the_banner(friction_found):
 
 def test_a_black_box_that_beats_the_physics_stands_in_the_banner(friction_found):
     better = replace(friction_found, black_box=BlackBox("ARX", 12, 0.01, 0.05))
-    assert 'class="banner" role="note">A black box (ARX, 12 numbers)' in rendered(better)[0]
+    assert 'class="banner" role="note">A black box (ARX, 12 parameters)' in rendered(better)[0]
 
 
 def test_a_confirmed_diagnosis_has_no_banner(page):
@@ -127,10 +127,10 @@ def test_the_best_candidate_stands_in_the_first_paragraph_where_nothing_is_named
 def test_wrong_parameters_are_said_with_their_numbers(friction_found):
     alone = replace(friction_found.explanation, after=friction_found.explanation.retuned)
     bare = replace(told(friction_found, verdict="parameters", effects=()), explanation=alone, named=(), signatures=())
-    moved = final_moved_numbers(bare)
+    moved = final_moved_parameters(bare)
     assert moved
     text, _ = rendered(bare)
-    assert f"No physics is missing; numbers of the model are off: {moved[0].text}" in text
+    assert f"No physics is missing; parameters of the model are off: {moved[0].text}" in text
 
 
 def test_channels_stand_in_their_units_with_the_noise_beside(friction_found):

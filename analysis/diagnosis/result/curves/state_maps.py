@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.result.curves.signature_bins import bin_means
 from analysis.diagnosis.types import Mask
@@ -17,6 +15,12 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import system_of
+
+if TYPE_CHECKING:
+    from analysis.diagnosis.balance.judge_laws import Balance
+    from analysis.diagnosis.balance.motion import Motion
+    from analysis.diagnosis.balance.regression import Regression
+
 
 CLOUD = 600
 """Number of single samples that are drawn."""
@@ -94,7 +98,7 @@ class _AxisSeries:
 
 
 def state_maps(
-    diagnosis: Diagnosis, balances: Sequence[Balance], evidence: Sequence[Evidence], recording: Recording
+    diagnosis: Diagnosis, balances: "Sequence[Balance]", evidence: Sequence[Evidence], recording: Recording
 ) -> tuple[StateMaps, ...]:
     """Maps of all axes, in the order of drawing: the axis of the first named effect, then by missing force. From the
     force balances where there are any; else from the evidence of the re-tuned model."""
@@ -105,11 +109,11 @@ def state_maps(
     found = []
     for axis, letter in enumerate(letters):
         if balances:
-            series, completed = _of_balance(balances[axis], diagnosis, letter)
+            series, completed = _series_of_balance(balances[axis], diagnosis, letter)
             given = balances[axis].search.regression.prior is not None
             model = "the re-tuned model" if given else "mass, damping and stiffness alone"
         else:
-            series, completed, model = _of_evidence(evidence, axis), "", "the re-tuned model"
+            series, completed, model = _series_of_evidence(evidence, axis), "", "the re-tuned model"
         if series is not None:
             labels = (letter, units[axis], model, completed)
             found.append(_maps(series, labels, length))
@@ -117,7 +121,7 @@ def state_maps(
     return tuple(sorted(found, key=lambda each: (each.axis != first, -each.share)))
 
 
-def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_AxisSeries | None, str]:
+def _series_of_balance(balance: "Balance", diagnosis: Diagnosis, letter: str) -> tuple[_AxisSeries | None, str]:
     regression = balance.search.regression
     names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
     named = [law.place for law in balance.laws if law.played_as in names]
@@ -131,19 +135,19 @@ def _of_balance(balance: Balance, diagnosis: Diagnosis, letter: str) -> tuple[_A
         np.concatenate([motion.position[:: motion.step, axis] for motion in motions]),
         np.concatenate([motion.velocity[:: motion.step, axis] for motion in motions]),
         np.concatenate(regression.force),
-        np.concatenate(_explained_forces(regression, linear)),
-        np.concatenate(_explained_forces(regression, whole)) if laws else None,
+        np.concatenate(_forces_without_remainder(regression, linear)),
+        np.concatenate(_forces_without_remainder(regression, whole)) if laws else None,
         np.concatenate([motion.valid_samples(motion.fit | motion.test) for motion in motions]),
         _slices([len(force) for force in regression.force]),
     )
     return (series if series.used.any() else None), (NAMED if named else NOT_CONFIRMED if laws else "")
 
 
-def _explained_forces(regression: Regression, remainder: Sequence[FloatArray]) -> list[FloatArray]:
+def _forces_without_remainder(regression: "Regression", remainder: Sequence[FloatArray]) -> list[FloatArray]:
     return [force - left for force, left in zip(regression.force, remainder, strict=True)]
 
 
-def _seconds(motions: Sequence[Motion]) -> FloatArray:
+def _seconds(motions: "Sequence[Motion]") -> FloatArray:
     count = sum(len(motion.force[:: motion.step]) for motion in motions)
     return np.asarray(np.arange(count) * motions[0].step / motions[0].rate_hz)
 
@@ -153,7 +157,7 @@ def _slices(counts: Sequence[int]) -> tuple[slice, ...]:
     return tuple(slice(begin, end) for begin, end in pairwise(ends))
 
 
-def _of_evidence(evidence: Sequence[Evidence], axis: int) -> _AxisSeries | None:
+def _series_of_evidence(evidence: Sequence[Evidence], axis: int) -> _AxisSeries | None:
     """The samples of one axis from the evidence; None where its motion is not known."""
     if not evidence or any(axis >= each.axis_force.shape[1] for each in evidence):
         return None
@@ -203,7 +207,7 @@ def _view(
 
 
 def _loops(series: _AxisSeries, length: str) -> tuple[Loop, ...]:
-    part = _stretch(series)
+    part = _largest_period(series)
     after = np.zeros(0) if series.after is None else series.after[part]
     forces = series.force[part], series.before[part], after
     return tuple(
@@ -212,7 +216,7 @@ def _loops(series: _AxisSeries, length: str) -> tuple[Loop, ...]:
     )
 
 
-def _stretch(series: _AxisSeries) -> slice:
+def _largest_period(series: _AxisSeries) -> slice:
     """About one period of the motion, where its travel is largest."""
     part = max(series.parts, key=lambda each: float(np.ptp(series.position[each])) if each.stop > each.start else 0.0)
     position = series.position[part]

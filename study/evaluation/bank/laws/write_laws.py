@@ -1,4 +1,5 @@
-"""Write the results of a proof of laws: a JSON document, a table with one row per case, and lines for the terminal."""
+"""Write the results of a blind test of laws: a JSON document, a table with one row per case, and lines for the
+terminal."""
 
 import json
 import sys

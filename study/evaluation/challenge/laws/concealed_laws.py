@@ -29,7 +29,7 @@ class Sizes:
 
 @dataclass(frozen=True, slots=True)
 class LawKind:
-    """One family of laws, and how its numbers are drawn."""
+    """One family of laws, and how its parameters are drawn."""
 
     name: str
     formula: str

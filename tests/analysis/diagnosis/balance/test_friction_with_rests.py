@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.judge_laws import family_of
+from analysis.diagnosis.balance.judged_law import family_of
 from tests.analysis.diagnosis.balance.invented_axis import recording
 
 RATE_HZ, STEPS = 250.0, 20

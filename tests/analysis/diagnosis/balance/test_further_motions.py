@@ -5,7 +5,8 @@ import pytest
 
 from analysis.diagnosis.balance.balances import motions_in_own_band
 from analysis.diagnosis.balance.motion import motion_band_hz, motions_of
-from analysis.diagnosis.confirm.fitting_measures import BALANCE_LEAVES_LESS, choose_fitting_measure, choose_plain_forces
+from analysis.diagnosis.confirm.fitting_measures import choose_fitting_measure
+from analysis.diagnosis.confirm.measures_of_balances import BALANCE_LEAVES_LESS, choose_plain_forces
 from analysis.diagnosis.data.observed_parts import observed_parts
 from equalizer.plant.mechanical_model import MechanicalModel
 

@@ -1,4 +1,4 @@
-"""Where a force balance names laws along one body per command, its own numbers are the first model."""
+"""Where a force balance names laws along one body per command, its own parameters are the first model."""
 
 from dataclasses import replace
 

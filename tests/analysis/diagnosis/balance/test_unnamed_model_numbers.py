@@ -1,4 +1,4 @@
-"""Numbers that a fitted model holds already are not named; without repeats no verdict is `explained`."""
+"""Parameters that a fitted model holds already are not named; without repeats no verdict is `explained`."""
 
 from dataclasses import replace
 

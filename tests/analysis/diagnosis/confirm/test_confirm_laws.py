@@ -1,4 +1,4 @@
-"""Where named laws are fitted from, and which of several is dropped because the data leave its numbers open."""
+"""Where named laws are fitted from, and which of several is dropped because the data leave its parameters open."""
 
 from types import SimpleNamespace
 
@@ -8,17 +8,17 @@ import pytest
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.laws import _stop_values
 from analysis.diagnosis.confirm import confirm_laws as by_balance
+from analysis.diagnosis.confirm import require_gain
 from analysis.diagnosis.confirm.confirm_laws import (
-    ONLY_BESIDE_CALIBRATION,
     VAGUE,
     _find_vague_law,
     _from_starts,
     _prefer_special_case,
     open_refinements,
-    unname_doubtful_effects,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
 from analysis.diagnosis.confirm.laws_for_simulation import can_be_played, find_special_case, hypothesis_of_judged
+from analysis.diagnosis.confirm.require_gain import ONLY_BESIDE_CALIBRATION, unname_doubtful_effects
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search import SearchResult
@@ -81,7 +81,7 @@ def result_of(*laws, errors=()):
         ((DRY,), (OPEN,), ()),
         ((BENT,), (SURE, 9.0 * OPEN, 4.0 * OPEN), ()),
     ],
-    ids=["all known", "no stiffness", "of the second", "nothing simpler", "signed numbers go elsewhere"],
+    ids=["all known", "no stiffness", "of the second", "nothing simpler", "signed parameters go elsewhere"],
 )
 def test_open_are_positive_numbers_that_the_special_case_lacks(laws, errors, open_ones):
     assert open_refinements(result_of(*laws, errors=errors), 1) == open_ones
@@ -121,7 +121,7 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
         return [ends_at(from_balance if np.any(deviations) else from_model)]
 
     monkeypatch.setattr(by_balance, "_steps", steps)
-    monkeypatch.setattr(by_balance, "numbers_beside_laws", lambda tuning, balances, laws: np.array([1.0, -2.0]))
+    monkeypatch.setattr(by_balance, "parameters_beside_laws", lambda tuning, balances, laws: np.array([1.0, -2.0]))
     context = SimpleNamespace(tuning=None, with_test_score=lambda candidate: candidate)
     _, after = _from_starts(context, (), (ends_at(8.0), ends_at(8.0)), ())
     assert after.score.test[0] == end
@@ -182,7 +182,7 @@ def searched_to(*names):
 
 @pytest.fixture
 def gains_half(monkeypatch):
-    monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(0.5, 0.4, 0.6))
+    monkeypatch.setattr(require_gain, "held_out_gain", lambda *_: HeldOutGain(0.5, 0.4, 0.6))
 
 
 @pytest.mark.usefixtures("gains_half")
@@ -222,13 +222,13 @@ def law_of_effect(name, place):
 @pytest.mark.usefixtures("gains_half")
 @pytest.mark.parametrize("predicts", [True, False])
 def test_what_the_signal_itself_shows_keeps_its_name_unless_the_model_runs_away(monkeypatch, predicts):
-    monkeypatch.setattr(by_balance, "predicts_something", lambda *_: predicts)
+    monkeypatch.setattr(require_gain, "predicts_something", lambda *_: predicts)
     seen = searched_to("sensor_clipping")
     assert (unname_doubtful_effects(seen) is seen) == predicts
 
 
 def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
-    monkeypatch.setattr(by_balance, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
+    monkeypatch.setattr(require_gain, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
     assert unname_doubtful_effects(searched_to("slew_limit")).unconfirmed == ()
 
 

@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.growth_rate import growth_rate, is_unstable_within
+from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
 from analysis.diagnosis.errors.tuning import tuning_of
 from equalizer.effects.catalogue import CATALOGUE
+from equalizer.plant.linear_simulation import growth_rate
 from equalizer.plant.mechanical_model import Tolerance
 
 TRIED = ("coulomb_friction", "sensor_clipping", "hardening_stiffness")

@@ -14,9 +14,9 @@ from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.law_of_sum import law_of_sum, laws_of
 from analysis.diagnosis.discovery.matched_filter import views_of
-from analysis.diagnosis.discovery.proof import SAME_KIND
 from analysis.diagnosis.discovery.screen_terms import products_of
 from analysis.diagnosis.discovery.snap_exponents import simplify_powers
+from analysis.diagnosis.discovery.validation import SAME_KIND
 from analysis.diagnosis.discovery.view_terms import view_terms
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit

@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis.diagnosis.data.observed import observe
-from analysis.diagnosis.discovery.proof import held_out_kinds
+from analysis.diagnosis.discovery.validation import held_out_kinds
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 

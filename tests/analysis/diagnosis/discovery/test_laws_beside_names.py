@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.discovery.add_laws import LawSearch, may_stand_for_a_law, weigh_laws
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
-from analysis.diagnosis.discovery.proof import does_as_well_with_less
+from analysis.diagnosis.discovery.validation import does_as_well_with_less
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine

@@ -9,7 +9,7 @@ from analysis.diagnosis.discovery.add_laws import LawSearch, weigh_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round, discover
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.law_of_sum import laws_of
-from analysis.diagnosis.discovery.proof import choose_on_held_out, holds_elsewhere
+from analysis.diagnosis.discovery.validation import choose_on_held_out, holds_elsewhere
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine

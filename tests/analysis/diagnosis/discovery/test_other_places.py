@@ -18,10 +18,9 @@ from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, law_of_sum, laws_of
 from analysis.diagnosis.discovery.matched_filter import views_of
 from analysis.diagnosis.discovery.view_terms import reading_terms
-from analysis.diagnosis.document import Candidate, diagnosis_from_json
+from analysis.diagnosis.document import Candidate, diagnosis_from_json, found_law
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.found_law import found_law
 from analysis.diagnosis.result.candidates import beside_given
 from equalizer.effects.discovered_law import Channels, law_effect, law_parameters, law_values
 from equalizer.effects.effect import PlacedEffect
@@ -106,7 +105,7 @@ def test_a_pair_has_equal_halves_and_is_told_from_one_force_only_by_the_calibrat
     assert np.sqrt(np.mean(apart**2)) < 1e-3 * np.sqrt(np.mean((fitted.residuals[0] - begun.residuals[0]) ** 2))
     single = replace(pair, factors=(1.2,), partner=None)
     one = evaluate_fit(measure, tuning, fitted.deviations, hypothesis_of_sum(single, recording))
-    assert as_pair(measure, tuning, (one, single), pair) is None  # the coupled number cannot take 0.6 N s/m
+    assert as_pair(measure, tuning, (one, single), pair) is None  # the coupled parameter cannot take 0.6 N s/m
     inputs = recording.command.channels
     assert not is_taken_by_coupling(tuning, even, inputs)
     loose = replace(tuning, deviation=100 * tuning.deviation)
@@ -138,7 +137,7 @@ def test_one_force_alone_may_always_be_half_the_models_own(seed=4):
 
 
 def test_a_coupled_damper_is_no_pair(seed=4):
-    """Both axes push each other alike: a number of the model, whose tolerance allows it."""
+    """Both axes push each other alike: a parameter of the model, whose tolerance allows it."""
     model = replace(device(2), tolerance=Tolerance(0.0003, 0.3, 0.8, 0.01))
     assert found_in(recorded_on_axes(2, whirl(0.6, sign=1.0), seed), model)[1] is None
 

@@ -1,4 +1,4 @@
-"""The screen of terms: bounds of the model's own numbers, and slopes of a frequency over a long recording."""
+"""The screen of terms: bounds of the model's own parameters, and slopes of a frequency over a long recording."""
 
 from dataclasses import replace
 
@@ -51,7 +51,7 @@ def test_the_models_numbers_stay_within_the_bounds_of_re_tuning(pumped):
     """A residual that half of the mass gone would explain, and more."""
     mass = pumped.parameter_columns[0]
     gone = replace(pumped, residual=-50 * mass)
-    moved = solve(products_of(gone)).weights[0] - gone.pull[0]
+    moved = solve(products_of(gone)).weights[0] - gone.to_calibration[0]
     assert moved == pytest.approx(-RETUNING_BOUND)
 
 

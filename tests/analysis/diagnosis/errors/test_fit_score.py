@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.growth_rate import growth_rate, is_unstable_within
+from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.errors.fit_score import FitScore, fit_score, rms_over, signal_rms
+from equalizer.plant.linear_simulation import growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 
 

@@ -1,4 +1,4 @@
-"""Claims with numbers: what a fit steps along is what is simulated."""
+"""Claims with parameters: what a fit steps along is what is simulated."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,6 @@
 """Intervals hold the truth as often as they say, where errors are neither white nor of the assumed strength.
 
-On an invented measure whose prediction is a straight line in all numbers.
+On an invented measure whose prediction is a straight line in all parameters.
 """
 
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Fits find numbers that were invented, and stay where the data say nothing."""
+"""Fits find parameters that were invented, and stay where the data say nothing."""
 
 import numpy as np
 import pytest
@@ -135,7 +135,7 @@ def test_a_step_within_bounds_is_the_best_one():
 
 
 class RanAway:
-    """A measure whose simulation diverges as soon as a number of the model moves."""
+    """A measure whose simulation diverges as soon as a parameter of the model moves."""
 
     def __init__(self, measure, size):
         self.records, self.measure, self.size = measure.records, measure, size

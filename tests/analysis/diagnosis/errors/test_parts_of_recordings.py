@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.force_driven import as_force_driven
+from analysis.diagnosis.data.measured_motion import as_force_driven
 from analysis.diagnosis.data.observed_parts import names_of_parts, observed_parts
 from analysis.diagnosis.errors.choose_measure import measure_of
 from equalizer.signals.joining import join

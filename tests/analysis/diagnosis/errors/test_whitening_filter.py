@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.errors.coloured_measure import whitening_filter
+from analysis.diagnosis.errors.whitened_measure import whitening_filter
 
 LEAST = np.array([1e-3])
 

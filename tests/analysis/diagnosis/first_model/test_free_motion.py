@@ -67,7 +67,7 @@ def test_the_weight_of_a_pendulum_is_named_from_its_decays(seed):
     found = diagnose_values(recording(decay(pendulum, 1.6, 12, seed), decay(pendulum, 0.9, 12, seed + 10)))
     assert "gravity_torque" in names_of(found)
     assert found.diagnosis.fit.test.after < 0.3 * found.diagnosis.fit.test.retuned
-    # Its two numbers make one: spring and weight together hold the small motion.
+    # Its two parameters make one: spring and weight together hold the small motion.
     (weight,) = (each for each in found.diagnosis.effects if each.effect == "gravity_torque")
     held = found.improved.stiffness[0, 0] + weight.parameters["torque"].value
     assert held == pytest.approx(TURN_RAD_PER_S2, rel=0.05)
@@ -83,7 +83,7 @@ def test_dry_friction_is_named_from_a_decay(seed):
 
 
 def test_a_decay_in_an_unknown_unit_is_read_as_a_position_and_named():
-    """As of a photodiode that a swinging mirror shines on: its numbers are in no unit."""
+    """As of a photodiode that a swinging mirror shines on: its parameters are in no unit."""
     counted = recording(decay(rubbing, 1.0, 8, 3))
     response = replace(counted.response, quantity="1", unit="1", channels=("diode",))
     unknown = replace(counted, response=response)

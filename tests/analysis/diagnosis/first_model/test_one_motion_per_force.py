@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.balance.motion import motion_signal
 from analysis.diagnosis.data.driven_response import response_significance
-from analysis.diagnosis.data.force_driven import all_as_force_driven
+from analysis.diagnosis.data.measured_motion import all_as_force_driven
 from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from analysis.diagnosis.settings import ANSWER_DEVIATIONS
 from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, of, smooth, speed_of

@@ -11,7 +11,7 @@ from analysis.diagnosis.forces.inverse_dynamics import band_motion, required_for
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.along_motion import force_along
-from equalizer.effects.simulation.bristle_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.linear_simulation import LinearSteps, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel

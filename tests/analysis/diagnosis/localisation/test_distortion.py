@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.detection_lines import detection_lines, hold_length
+from analysis.diagnosis.data.spectral_lines import detection_lines, hold_length
 from analysis.diagnosis.localisation.distortion import find_distortions
 from analysis.diagnosis.localisation.level_trends import level_trends
 from analysis.diagnosis.noise.noise_floor import noise_floor

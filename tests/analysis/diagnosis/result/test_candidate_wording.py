@@ -74,7 +74,7 @@ def test_laws_beyond_the_vocabulary_have_nouns_and_units(effect):
     assert "_" not in noun_of(effect)
     assert effect not in EFFECT_WORDS
     law = LAW_WORDS[effect]
-    # The numbers of a sensor are in the unit of what it reads.
+    # The parameters of a sensor are in the unit of what it reads.
     numbers = set() if law.place == "sensor" else set(law.words.numbers) - set(law.words.shares)
     assert numbers == set(law.units)
     assert {unit_of(effect, name, system) for name in law.units for system in (LINEAR, ROTATIONAL)} != {"1"}
@@ -85,7 +85,7 @@ def test_a_class_is_called_by_what_its_laws_have_in_common():
     assert effect_title(friction, True) == "friction (dry friction, or 2 laws like it) on the x drive"
     assert inseparable_sentence(friction) == (
         "Friction whose law these data leave open: dry friction, friction that is larger at rest (Stribeck) or dry "
-        "friction with elastic presliding would each explain it as well on held-out data. The numbers are those of "
+        "friction with elastic presliding would each explain it as well on held-out data. The parameters are those of "
         "dry friction."
     )
     late = of_class(

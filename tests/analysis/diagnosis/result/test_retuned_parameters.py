@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
-from analysis.diagnosis.result.retuned_parameters import MovedNumber, doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.retuned_parameters import MovedParameter, doubtful_sentences, retuned_sentence
 
-MOVED = MovedNumber("damping fx", 0.35, "N s/m", 2.1)
+MOVED = MovedParameter("damping fx", 0.35, "N s/m", 2.1)
 
 
 def test_numbers_of_the_model_that_moved_too_far_are_doubted():
@@ -19,7 +19,7 @@ def test_numbers_of_the_model_that_moved_too_far_are_doubted():
 
 def test_a_model_that_was_fitted_here_has_no_calibration_to_leave():
     assert retuned_sentence((MOVED,), fitted=True) == (
-        "Fitted once more, these numbers of the first model moved by more than was left open at first: "
+        "Fitted once more, these parameters of the first model moved by more than was left open at first: "
         "damping fx +0.350 N s/m."
     )
     assert doubtful_sentences((replace(MOVED, deviations=-3.4),), fitted=True) == ()
@@ -30,10 +30,10 @@ def test_a_model_that_was_fitted_here_has_no_calibration_to_leave():
 def test_many_doubtful_numbers_are_counted_in_one_sentence():
     moved = (*(replace(MOVED, deviations=4.0) for _ in range(8)), *(replace(MOVED, deviations=-3.5) for _ in range(3)))
     (said,) = doubtful_sentences(moved)
-    assert said.startswith("11 numbers were moved by 3 standard deviations of their calibration or more, 8 of them")
+    assert said.startswith("11 parameters were moved by 3 standard deviations of their calibration or more, 8 of them")
 
 
 def test_a_relative_change_is_read_as_per_cent():
-    assert MovedNumber("mass of the mode at 82 Hz", -0.021, "1", -2.1).text == (
+    assert MovedParameter("mass of the mode at 82 Hz", -0.021, "1", -2.1).text == (
         "mass of the mode at 82 Hz −2.1 % (2.1 standard deviations)"
     )

@@ -3,11 +3,11 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, NextExperiment, Rival
-from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, numbers_text, place_words
+from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, parameters_text, place_words
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.ceiling_wording import black_box_sentence
 from analysis.diagnosis.result.findings import BlackBox
-from analysis.diagnosis.result.retuned_parameters import MovedNumber, raised_sentence
+from analysis.diagnosis.result.retuned_parameters import MovedParameter, raised_sentence
 from analysis.diagnosis.result.wording import (
     confirmation_sentence,
     effect_sentence,
@@ -36,7 +36,7 @@ DRY = NamedEffect(
     "coulomb_friction", "mechanism", "x", 0.9, 0.68, {"level": Estimate(0.211, "N", (0.20, 0.22))}, RIVALS
 )
 
-MOVED = MovedNumber("damping fx", 0.35, "N s/m", 2.1)
+MOVED = MovedParameter("damping fx", 0.35, "N s/m", 2.1)
 
 
 def diagnosis(verdict, effects=(), mismatch=(PLACE,), remainder=(), errors=ERRORS, next_=None):
@@ -103,20 +103,22 @@ def test_places_are_said_as_people_say_them(place, axis, single, words):
 
 def test_several_numbers_are_each_explained():
     numbers = {"coulomb": Estimate(0.15, "N"), "static": Estimate(0.21, "N"), "speed": Estimate(0.0045, "m/s")}
-    assert numbers_text("stribeck_friction", numbers) == (
+    assert parameters_text("stribeck_friction", numbers) == (
         "0.150 N in motion, 0.210 N at rest, a transition over 4.50 mm/s"
     )
 
 
 def test_a_share_of_samples_is_read_as_per_cent():
-    assert numbers_text("lost_samples", {"fraction": Estimate(0.02, "1", (0.018, 0.022))}) == "2.0 % [1.8, 2.2] of all"
+    assert (
+        parameters_text("lost_samples", {"fraction": Estimate(0.02, "1", (0.018, 0.022))}) == "2.0 % [1.8, 2.2] of all"
+    )
 
 
 def test_a_stop_on_the_far_side_of_zero_says_from_where_it_is_reached():
     numbers = {"position": Estimate(-0.0035, "m", None), "stiffness": Estimate(1e4, "N/m", None)}
-    plain = numbers_text("end_stop", numbers)
+    plain = parameters_text("end_stop", numbers)
     for side, way in ((1.0, "positive"), (-1.0, "negative")):
-        said = numbers_text("end_stop", numbers | {"side": Estimate(side, "1", None)})
+        said = parameters_text("end_stop", numbers | {"side": Estimate(side, "1", None)})
         assert said == f"{plain}, reached in the {way} direction"
 
 
@@ -155,7 +157,7 @@ def test_an_error_is_not_counted_in_noise_that_no_repeats_show():
 def test_wrong_parameters_are_another_answer_than_missing_physics():
     said = verdict_sentence(diagnosis("parameters"), (MOVED,))
     assert said.startswith(
-        "No physics is missing; numbers of the model are off: damping fx +0.350 N s/m (2.1 standard deviations)."
+        "No physics is missing; parameters of the model are off: damping fx +0.350 N s/m (2.1 standard deviations)."
     )
     assert "falls from 50 % of the signal (as given) to 36 % (re-tuned)" in said
 
@@ -240,7 +242,7 @@ def test_the_next_recording_says_what_it_would_tell_apart():
 )
 def test_a_black_box_that_beats_the_physics_is_said_to(test, physics, end):
     said = black_box_sentence(BlackBox("ARX", 12, test, physics), named=True)
-    assert said.startswith("A black box (ARX, 12 numbers), fitted to the same samples, leaves")
+    assert said.startswith("A black box (ARX, 12 parameters), fitted to the same samples, leaves")
     assert said.endswith(end)
     assert "the re-tuned model leaves" in black_box_sentence(BlackBox("ARX", 12, test, physics), named=False)
 
@@ -271,7 +273,7 @@ def test_faults_of_a_whole_sensor_need_no_place():
 def test_numbers_that_are_off_by_little_are_said_to_be():
     said = verdict_sentence(diagnosis("parameters"))
     assert said.startswith(
-        "No physics is missing; numbers of the model are off, each within its calibration's standard deviation. The"
+        "No physics is missing; parameters of the model are off, each within its calibration's standard deviation. The"
     )
 
 

@@ -1,4 +1,5 @@
-"""Laws that move a device nearly alike share what the model's own numbers do, and end where they end by themselves."""
+"""Laws that move a device nearly alike share what the model's own parameters do, and end where they end by
+themselves."""
 
 from dataclasses import replace
 

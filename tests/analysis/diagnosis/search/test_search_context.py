@@ -1,4 +1,4 @@
-"""A fit that ended at numbers which do almost the same begins again."""
+"""A fit that ended at parameters which do almost the same begins again."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""No candidate has numbers beyond what was recorded, and no hum is a harmonic of the tone that drives."""
+"""No candidate has parameters beyond what was recorded, and no hum is a harmonic of the tone that drives."""
 
 from dataclasses import replace
 

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
 from analysis.evaluation.proof.calibration import calibration
-from analysis.evaluation.proof.detection import classify_outcome, detection_strips, oracle_threshold, shares_by_size
+from analysis.evaluation.proof.detection import classify_outcome, detection_strips, ideal_threshold, shares_by_size
 from analysis.evaluation.proof.follow_up import FollowUp
 from analysis.evaluation.proof.outcome import Concealed, Outcome
 from analysis.evaluation.proof.score import is_miss, score
@@ -153,12 +153,12 @@ def test_each_draw_becomes_a_mark_of_its_effect():
     assert classify_outcome(BROKEN) == "missed"
 
 
-def test_an_oracle_sees_an_effect_from_where_it_adds_three_quarters_of_the_noise():
+def test_an_ideal_observer_sees_an_effect_from_where_it_adds_three_quarters_of_the_noise():
     drawn = [outcome(adds=0.075 * 100**strength, strengths=(strength,)) for strength in (0.0, 0.2, 0.7, 1.0)]
-    assert oracle_threshold(drawn) == pytest.approx(0.5)
-    assert oracle_threshold([outcome(adds=9.0, strengths=(s,)) for s in (0.0, 0.5, 1.0)]) is None  # it does not grow
-    assert oracle_threshold(drawn[:2]) is None
-    assert detection_strips(drawn)[0].oracle == pytest.approx(0.5)
+    assert ideal_threshold(drawn) == pytest.approx(0.5)
+    assert ideal_threshold([outcome(adds=9.0, strengths=(s,)) for s in (0.0, 0.5, 1.0)]) is None  # it does not grow
+    assert ideal_threshold(drawn[:2]) is None
+    assert detection_strips(drawn)[0].ideal_threshold == pytest.approx(0.5)
 
 
 def test_larger_effects_come_later():

@@ -173,7 +173,7 @@ def test_from_the_acceptance_to_the_first_day_at_the_command_line(device_like, m
     assert "No person may hold the handle" in capsys.readouterr().err
     for noise, code, word in ((0.05, 0, "fine"), (0.3, 3, "WRONG")):
         state |= {"seed": state["seed"] + 1, "noise": noise}
-        monkeypatch.setattr(daily_check, "_moment", lambda seed=state["seed"]: f"{seed}")
+        monkeypatch.setattr(daily_check, "_time_stamp", lambda seed=state["seed"]: f"{seed}")
         assert main([*doctor, "--daily"]) == code
         shown = capsys.readouterr()
         assert "No person may hold the handle" in shown.err

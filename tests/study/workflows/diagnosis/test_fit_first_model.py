@@ -1,4 +1,4 @@
-"""First models of invented mechanisms: numbers come back within their intervals, and what cannot be is refused."""
+"""First models of invented mechanisms: parameters come back within their intervals, and what cannot be is refused."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -23,7 +23,7 @@ from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import due_results, write_results, write_tables
 from study.workflows.session.end_sitting import finish_closed
-from study.workflows.session.participant_number import begun_in
+from study.workflows.session.participant_number import read_begun_participant
 from study.workflows.views.session_line import session_line
 from study.workflows.views.view_session import session_view
 from study.workflows.views.watch_session import follow
@@ -218,7 +218,7 @@ def read_by_all(session: Path) -> None:
     session_line(folder)
     session_view(session)
     validate_file(session)
-    begun_in(folder)
+    read_begun_participant(folder)
     for read in (lambda: collect_sessions(session), lambda: follow(session).look(NOW), lambda: fold_session(folder)):
         with contextlib.suppress(StudyError):
             read()

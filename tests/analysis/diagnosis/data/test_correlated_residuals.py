@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.lagged_products import lagged_products
+from analysis.diagnosis.data.correlated_residuals import lagged_products
 
 
 @pytest.mark.parametrize("count", [1, 5, 8])

@@ -1,8 +1,8 @@
 """Checks that a discovered law must pass before it is named; each check that fails gives a sentence.
 
 With so many formulas some fit anything. A law is named only where held-out stretches of another kind than those it was
-found in confirm it (extrapolation), where its numbers are the same in every stretch (stability), where the same search
-in a shuffled force finds nothing (negative control), and where no law of other variables fits as well.
+found in confirm it (extrapolation), where its parameters are the same in every stretch (stability), where the same
+search in a shuffled force finds nothing (negative control), and where no law of other variables fits as well.
 """
 
 from collections.abc import Iterator, Sequence
@@ -87,7 +87,7 @@ def _reasons_against(context: SearchContext, of: Discovery, rivals: Sequence[Fit
     for number, found in enumerate(of.rounds):
         first = found.sums[0]
         if first.spread > LAW_STABLE and not holds_elsewhere(of.found):
-            yield f"its numbers differ by {100 * first.spread:.0f} % from stretch to stretch"
+            yield f"its parameters differ by {100 * first.spread:.0f} % from stretch to stretch"
         taken, by_chance = found.shares_above_noise
         if 1 - taken > LAW_PLACEBO * (1 - by_chance):
             yield (
@@ -167,10 +167,10 @@ def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
 
 
 def does_as_well_with_less(context: SearchContext, of: Discovery, rival: FittedCandidate) -> bool:
-    """Whether the laws have fewer numbers than a rival, exponents that were rounded included, and leave no more error
-    than it where they were fitted and, within what the noise is known to, where they were not: of two descriptions that
-    fit alike, the shorter. Both with held-out errors; a tenth of what the noise is known to is left to fits that end
-    where they no longer gain."""
+    """Whether the laws have fewer parameters than a rival, exponents that were rounded included, and leave no more
+    error than it where they were fitted and, within what the noise is known to, where they were not: of two
+    descriptions that fit alike, the shorter. Both with held-out errors; a tenth of what the noise is known to is left
+    to fits that end where they no longer gain."""
     law = of.found.after
     sums = [each for found in of.rounds for each in (found.sums[0], found.sums[0].partner) if each is not None]
     numbers = sum(1 + len(term.numbers) for each in sums for term in each.terms)

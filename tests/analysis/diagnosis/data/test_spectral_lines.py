@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import f as f_distribution
 from scipy.stats import ncf
 
-from analysis.diagnosis.data.line_statistics import excess, noncentral_f_sf
+from analysis.diagnosis.data.spectral_lines import excess, noncentral_f_sf
 
 
 @pytest.mark.parametrize("lines", [2, 20, 200])

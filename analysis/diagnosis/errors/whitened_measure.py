@@ -13,7 +13,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 
-from analysis.diagnosis.data.lagged_products import lagged_products
+from analysis.diagnosis.data.correlated_residuals import lagged_products
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.types import Mask
@@ -69,7 +69,7 @@ def whitening_filter(residuals: Sequence[FloatArray], least: FloatArray) -> Whit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ColouredMeasure:
+class WhitenedMeasure:
     """An error measure with whitened residuals; they count where all samples that the filter uses are known."""
 
     plain: ErrorMeasure
@@ -111,10 +111,10 @@ class ColouredMeasure:
         return self.plain.evidence(model, effects, self.plain.residuals(model, effects))
 
 
-def whiten_measure(plain: ErrorMeasure, whitening: WhiteningFilter, noise: FloatArray) -> ColouredMeasure:
-    """The measure with whitened residuals. noise: (c,), see `ColouredMeasure`."""
+def whiten_measure(plain: ErrorMeasure, whitening: WhiteningFilter, noise: FloatArray) -> WhitenedMeasure:
+    """The measure with whitened residuals. noise: (c,), see `WhitenedMeasure`."""
     warm = [_leave_out_warm_up(record, whitening) for record in plain.records]
-    return ColouredMeasure(plain.with_records(tuple(warm)), whitening, noise, noise)
+    return WhitenedMeasure(plain.with_records(tuple(warm)), whitening, noise, noise)
 
 
 def _leave_out_warm_up(record: Observed, whitening: WhiteningFilter) -> Observed:

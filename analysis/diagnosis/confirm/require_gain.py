@@ -1,0 +1,64 @@
+"""Decides by the error on held-out samples which effects of a search stay named where the model was fitted to the same
+recordings."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_something
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.revise_selection import without_effect
+from analysis.diagnosis.search.search import SearchResult, Unconfirmed
+from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.settings import FURTHER_LAW_OF_ALL
+
+CONSTANT = "constant_force"
+CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
+"""Effects that are parameters of a fitted model, and their values."""
+SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
+"""Effects of a sensor that can be seen in its signal alone."""
+ONLY_BESIDE_CALIBRATION = (
+    "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
+    "calibrated model, or recordings of the device in order, would tell"
+)
+BESIDE_RUNAWAY = "the model without it leaves more than the mean of the signal, and all that bounds it gains"
+
+
+def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
+    """The result with only those effects named that take as much of the held-out error power as a law of a balance
+    must, and `explained` only where repeats show the noise. Constants are parameters of the model and need no test."""
+    found = result.found
+    while found.steps and not _takes_enough(result.context, found):
+        found = without_effect(result.context, found, len(found.steps) - 1)
+        result = replace(result, found=found, judgement=judge(found), errors=None)
+    names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed_effects()}
+    if repeats or result.judgement.verdict != "explained" or names <= set(CONSTANTS):
+        return result
+    return replace(result, judgement=replace(result.judgement, verdict="partly_explained"))
+
+
+def _takes_enough(context: SearchContext, found: Explanation) -> bool:
+    """Whether the last effect takes a notable share of the held-out error power beside those before it."""
+    before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
+    return not found.after.held_out > before.held_out + np.log(1 - FURTHER_LAW_OF_ALL) / 2
+
+
+def unname_doubtful_effects(result: SearchResult) -> SearchResult:
+    """The result with named effects of actuator and sensor made candidates, unless the signal itself shows them: the
+    model was fitted to these recordings, so that a law of the motion that the catalogue lacks may look like a nonlinear
+    or late sensor. What the signal shows is a candidate, too, where the model without it predicts nothing."""
+    found, demoted = result.found, []
+    doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
+    if len(doubtful) < len(found.steps) and not predicts_something(result.context.whole, found.plain):
+        doubtful = list(range(len(found.steps)))
+    for place in reversed(doubtful):
+        gain = held_out_gain(result.context.whole, found.plain, result.context.with_test_score(found.steps[place]))
+        if gain is not None and gain.gain > 0:
+            why_not = BESIDE_RUNAWAY if found.steps[place].newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
+            demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, why_not))
+        found = without_effect(result.context, found, place)
+    if not doubtful:
+        return result
+    kept = tuple(sorted(demoted, key=lambda each: -each.gain))
+    return replace(result, found=found, judgement=judge(found), errors=None, unconfirmed=(*result.unconfirmed, *kept))

@@ -1,0 +1,123 @@
+"""Spectral lines of a recording: which are driven, which are silent, and whether their power is more than noise.
+
+A linear device responds on driven lines only. Where all driven lines are odd multiples of one, odd distortion falls on
+odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon 2016). The lines are taken from the measured
+excitation, so that any multisine with silent lines is suitable.
+
+Lines are tested in octaves that begin at powers of two, the same for all recordings, so that results for a band of
+different recordings can be compared. The power of lines over noise has an F distribution.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import fdtrc
+
+from analysis.diagnosis.types import Mask
+from equalizer.signals.signal import ComplexArray, FloatArray
+
+Band = tuple[float, float]
+_SILENT = 3e-3
+"""Largest amplitude of a silent line, relative to the strongest line of its input."""
+_DRIVEN = 0.01
+"""Least power of a driven command, relative to the strongest."""
+_TINY = np.finfo(np.float64).tiny
+_LARGEST = 1e300
+"""Upper limit of an F ratio: SciPy returns NaN for infinity."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DetectionLines:
+    """Masks (lines,), within the driven band."""
+
+    driven: Mask
+    odd: Mask
+    """Silent lines that only odd distortion reaches."""
+    even: Mask
+    """Silent lines that only even distortion reaches."""
+    either: Mask
+    """Silent lines that both reach, because even lines were driven, too."""
+    step: int
+    """Greatest common divisor of the driven lines' numbers: lines between its multiples detect noise only."""
+
+    @property
+    def any_silent(self) -> bool:
+        return bool((self.odd | self.even | self.either).any())
+
+
+def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines | None:
+    """Driven lines of a periodic excitation, and silent ones on which distortion shows. excitation: (lines, inputs),
+    line k in row k - 1. held: samples for which each value of the command is held; above half of the command's own rate
+    there are only images. None where nothing is driven."""
+    size = np.abs(excitation)
+    size[(len(size) + 1) // held :] = 0
+    strongest = size.max()
+    if strongest == 0:
+        return None
+    driven = np.asarray((size > _SILENT * np.maximum(size.max(axis=0), 0.1 * strongest)).any(axis=1))
+    numbers = np.arange(1, len(driven) + 1)
+    step = int(np.gcd.reduce(numbers[driven]))
+    lowest, highest = numbers[driven][[0, -1]]
+    silent = ~driven & (numbers >= lowest) & (numbers <= highest) & (numbers % step == 0)
+    multiple = numbers // step
+    odd_only = bool((multiple[driven] % 2 == 1).all()) and highest > lowest
+    none = np.zeros(len(driven), dtype=np.bool_)
+    if not odd_only:
+        return DetectionLines(driven, none, none, np.asarray(silent), step)
+    return DetectionLines(
+        driven, np.asarray(silent & (multiple % 2 == 1)), np.asarray(silent & (multiple % 2 == 0)), none, step
+    )
+
+
+def hold_length(command: npt.NDArray[np.float64]) -> int:
+    """Number of samples for which each value of the command is held. command: (n, inputs)"""
+    moves = np.flatnonzero(np.any(np.diff(command, axis=0) != 0, axis=1))
+    return int(np.gcd.reduce(np.diff(moves))) if len(moves) > 16 else 1
+
+
+def octaves_between(from_hz: float, to_hz: float) -> tuple[Band, ...]:
+    """All octaves that overlap the interval; a last line on an edge opens its own octave. Both must be positive."""
+    first = int(np.floor(np.log2(from_hz) + 1e-9))
+    last = int(np.floor(np.log2(to_hz) + 1e-9))
+    return tuple((2.0**power, 2.0 ** (power + 1)) for power in range(first, last + 1))
+
+
+def lines_in_band(frequency_hz: FloatArray, band_hz: Band) -> Mask:
+    """(lines,): lower edge included, upper edge excluded."""
+    return np.asarray((frequency_hz >= band_hz[0] * (1 - 1e-9)) & (frequency_hz < band_hz[1] * (1 - 1e-9)))
+
+
+def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the inputs that were driven in a segment. power: (inputs,). An input that only reacts, by feedback,
+    stays below a hundredth of the strongest where the excitation was recorded."""
+    if power.max(initial=0.0) == 0:
+        return ()
+    return tuple(name for name, strength in zip(channels, power, strict=True) if strength > _DRIVEN * power.max())
+
+
+def noncentral_f_sf(
+    ratio: npt.ArrayLike, lines: npt.ArrayLike, freedom: npt.ArrayLike, noncentrality: npt.ArrayLike
+) -> FloatArray:
+    """P(F >= ratio) with 2 `lines` and `freedom` degrees of freedom, by Patnaik's central F of equal moments (1949).
+
+    Exact for noncentrality 0. Chosen over the series because it holds for noncentralities of millions, too.
+    """
+    degrees = 2 * np.asarray(lines, dtype=np.float64)
+    shift = np.asarray(noncentrality, dtype=np.float64)
+    equal = (degrees + shift) * ((degrees + shift) / (degrees + 2 * shift))
+    scaled = np.asarray(ratio, dtype=np.float64) * degrees / (degrees + shift)
+    return np.asarray(fdtrc(equal, freedom, np.minimum(scaled, _LARGEST)), dtype=np.float64)
+
+
+def excess(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float, float, float]:
+    """Summed power beyond noise, its detection limit (two standard errors of the noise), and the p-value.
+
+    power: (lines,) squared magnitudes. noise: (lines,) their expectation without a signal, known with `freedom`.
+    """
+    if len(power) == 0 or not np.isfinite(noise).all():
+        return 0.0, 0.0, 1.0
+    ratio = float(np.mean(power / np.maximum(noise, _TINY)))
+    p_value = float(fdtrc(2 * len(power), max(freedom, 1.0), min(ratio, _LARGEST)))
+    limit = 2 * float(np.sqrt(np.sum(noise**2) + 2 * np.sum(noise) ** 2 / max(freedom, 1.0)))
+    return float(np.sum(power - noise)), limit, p_value
