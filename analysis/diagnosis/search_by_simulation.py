@@ -10,7 +10,8 @@ from analysis.diagnosis.data.measured_motion import time_unit
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
-from analysis.diagnosis.search.search import HUM, Beyond, SearchResult, has_law, hums_low, search_effects
+from analysis.diagnosis.search.explain import Explanation
+from analysis.diagnosis.search.search import HUM, Beyond, SearchResult, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
 from analysis.diagnosis.types import Mapper, Progress
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
 """Laws of the command that a force balance tests: those that it does not name are absent."""
+LOWEST_MAINS_HZ = 45.0
 GAINS = ("force_gain", "sensor_gain")
 """Effects that a model fitted to the recordings absorbs: only with a calibrated model can a gain be found wrong."""
 
@@ -160,3 +162,15 @@ def _unseen_by_balance(name: str, place: str, imposed: bool) -> bool:
     actuator drives it."""
     driven = not imposed and name != "body_on_actuator" and name not in TESTED_BY_BALANCE
     return place == "sensor" or (place == "actuator" and driven)
+
+
+def hums_low(found: Explanation) -> bool:
+    """A line far below any mains is a harmonic of what drives the device."""
+    placed = found.after.fitted.hypothesis.placed_effects()
+    return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)
+
+
+def has_law(result: SearchResult) -> bool:
+    """Whether a discovered law is among what is named."""
+    claims = result.found.after.fitted.hypothesis.claims
+    return result.judgement.named and any(claim.effect.law is not None for claim in claims)

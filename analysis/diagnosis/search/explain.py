@@ -30,19 +30,18 @@ from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, gather_evidence
 from analysis.diagnosis.search.compare_candidates import compare_candidates, refine
 from analysis.diagnosis.search.no_prediction import predicts_nothing
-from analysis.diagnosis.search.parsimony import excludes, plainest_first
+from analysis.diagnosis.search.parsimony import plainest_first
 from analysis.diagnosis.search.same_within_errors import excess, inseparable
 from analysis.diagnosis.search.screening import screen
 from analysis.diagnosis.search.search_context import (
     SCREENING,
-    STARTING,
     FittedCandidate,
     SearchContext,
     first_fits,
     sensitivity_at,
 )
 from analysis.diagnosis.search.short_recordings import fits_on_short_recordings, short_recordings_of
-from analysis.diagnosis.search.starting_hypotheses import CLOCK_DRIFT, candidates, clock_drift_by_trial, within_data
+from analysis.diagnosis.search.starting_hypotheses import suggest_hypotheses, within_data
 from analysis.diagnosis.search.time_budget import OutOfTimeError, always, limit_map
 from analysis.diagnosis.settings import (
     ADDED_GAIN,
@@ -55,7 +54,6 @@ from analysis.diagnosis.settings import (
 )
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
-from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LOOKED_AHEAD = 2
@@ -149,7 +147,7 @@ def add_effects(
     """The explanation with further effects, up to `most` in all. A last round of `found` that brought none is not
     computed again: a pair is looked for beside its best."""
     rounds, steps = list(found.rounds), list(found.steps)
-    base = steps[-1] if steps else _without_test_score(context, found.retuned)
+    base = steps[-1] if steps else context.candidate(_evaluate_again(context, found.retuned))
     within_time, barred, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", found.ended_early
     open_ended = not context.certain and not found.barred and not ended_early
     while open_ended and len(steps) < most and is_worth_searching(context, found, base):
@@ -177,10 +175,9 @@ def add_effects(
     return replace(found, ended_early=ended_early, barred=barred or found.barred)
 
 
-def _without_test_score(context: SearchContext, scored: FittedCandidate) -> FittedCandidate:
-    """The candidate on the samples to fit and to choose by, of one that was scored on all."""
-    fitted = scored.fitted
-    return context.candidate(evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis))
+def _evaluate_again(context: SearchContext, scored: FittedCandidate) -> Fitted:
+    """The fit on the samples to fit and to choose by, of a candidate that was scored on others."""
+    return evaluate_fit(context.measure, context.tuning, scored.fitted.deviations, scored.fitted.hypothesis)
 
 
 def is_worth_searching(context: SearchContext, found: Explanation, base: FittedCandidate) -> bool:
@@ -188,9 +185,8 @@ def is_worth_searching(context: SearchContext, found: Explanation, base: FittedC
     if base.fitted.hypothesis.claims:
         beyond = 1.0 if context.references is None else context.references.beyond
         return base.score.worst_channel > SEARCH_ON * beyond
-    held_out = float(np.nanmax(found.retuned.score.test, initial=0.0))
-    surprised = context.references is not None or held_out > HELD_OUT_SURPRISE
-    return surprised or base.score.worst_channel > NOISE_ALONE
+    surprised = bool(np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)
+    return surprised or context.references is not None or base.score.worst_channel > NOISE_ALONE
 
 
 def _look_ahead(
@@ -232,9 +228,7 @@ def _known_rounds(
 
 
 def _refit(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
-    fitted = candidate.fitted
-    start = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
-    return context.candidate(refine(context, start))
+    return context.candidate(refine(context, _evaluate_again(context, candidate)))
 
 
 def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
@@ -271,17 +265,17 @@ def find_next_effect(
     told = [effect for effect in catalogue if context.measure.can_observe(effect)]
     short_form = short_recordings_of(context, base)
     if short_form is None:
-        suggested = _suggest_hypotheses(context, base.hypothesis, told, evidence)
+        suggested = suggest_hypotheses(context, base.hypothesis, told, evidence)
         known = sensitivity_at(context, base.deviations, base.hypothesis, with_forces=True)
         step.at(0.2)
         each = context.guard.over(context.map_, SCREENING)
         screened = screen(context.measure, context.tuning, base, known, suggested, each)
         fits = first_fits(context, base, known, screened)
     else:
-        timeless = _suggest_hypotheses(
+        timeless = suggest_hypotheses(
             context, base.hypothesis, [effect for effect in told if not effect.of_time], short_form.of(evidence)
         )
-        timed = _suggest_hypotheses(context, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
+        timed = suggest_hypotheses(context, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
         step.at(0.2)
         fits = fits_on_short_recordings(context, short_form, base, timeless, timed)
     step.at(0.6)
@@ -294,19 +288,6 @@ def find_next_effect(
             and within_data(candidate.fitted.hypothesis, evidence)
         ]
     )
-
-
-def _suggest_hypotheses(
-    context: SearchContext, held: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence
-) -> list[Hypothesis]:
-    suggested = [
-        hypothesis
-        for hypothesis in candidates(catalogue, evidence, context.guard.over(context.map_, STARTING))
-        if not any(excludes(claim, hypothesis.claims[0]) for claim in held.claims)
-    ]
-    if context.references is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held.claims):
-        suggested += context.guard.part(CLOCK_DRIFT, STARTING, lambda: clock_drift_by_trial(catalogue, evidence), ())
-    return suggested
 
 
 def is_worthwhile(base: FittedCandidate, better: FittedCandidate) -> bool:

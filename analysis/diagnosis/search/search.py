@@ -57,7 +57,7 @@ from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
 
 LAW_BEYOND = "a law outside the catalogue"
-HUM, LOWEST_MAINS_HZ = "mains_hum", 45.0
+HUM = "mains_hum"
 
 
 def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
@@ -184,8 +184,8 @@ def _is_better(result: SearchResult, early: SearchResult) -> bool:
     """Whether a result is named and explains more than an early one, on held-out samples."""
     if result.judgement.verdict == "explained" or not result.judgement.named:
         return result.judgement.named
-    left, before = (float(np.mean(np.log(each.found.after.score.test))) for each in (result, early))
-    return not left > before
+    left, before = (np.mean(np.log(each.found.after.score.test)) for each in (result, early))
+    return bool(not left > before)
 
 
 def _search_with_pairs(
@@ -300,15 +300,3 @@ def _judge_with_prediction(context: SearchContext, found: Explanation) -> Judgem
     if judged.named and is_without_prediction(context.whole, found.after):
         return Judgement("unexplained", False)
     return judged
-
-
-def hums_low(found: Explanation) -> bool:
-    """A line far below any mains is a harmonic of what drives the device."""
-    placed = found.after.fitted.hypothesis.placed_effects()
-    return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)
-
-
-def has_law(result: SearchResult) -> bool:
-    """Whether a discovered law is among what is named."""
-    claims = result.found.after.fitted.hypothesis.claims
-    return result.judgement.named and any(claim.effect.law is not None for claim in claims)
