@@ -27,21 +27,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine
-from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, gather_evidence
-from analysis.diagnosis.search.compare_candidates import compare_candidates, refine
-from analysis.diagnosis.search.no_prediction import predicts_nothing
-from analysis.diagnosis.search.parsimony import plainest_first
-from analysis.diagnosis.search.same_within_errors import excess, inseparable
-from analysis.diagnosis.search.screening import screen
+from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
+from analysis.diagnosis.search.compare_candidates import refine
+from analysis.diagnosis.search.next_effect import Step, find_next_effect
+from analysis.diagnosis.search.same_within_errors import excess, inseparable, is_worthwhile
 from analysis.diagnosis.search.search_context import (
-    SCREENING,
     FittedCandidate,
     SearchContext,
-    first_fits,
-    sensitivity_at,
 )
-from analysis.diagnosis.search.short_recordings import fits_on_short_recordings, short_recordings_of
-from analysis.diagnosis.search.starting_hypotheses import suggest_hypotheses, within_data
 from analysis.diagnosis.search.time_budget import OutOfTimeError, always, limit_map
 from analysis.diagnosis.settings import (
     ADDED_GAIN,
@@ -242,61 +235,6 @@ def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypo
 def retune_alone(context: SearchContext) -> Fitted:
     """The model re-tuned, without any added effect."""
     return refine(context, evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NOTHING))
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """Part of the work, for the progress display."""
-
-    what: str
-    begun: float
-    progress: Progress
-
-    def at(self, share: float) -> None:
-        self.progress(self.what, self.begun + 0.3 * share)
-
-
-def find_next_effect(
-    context: SearchContext, catalogue: Sequence[Effect], base: Fitted, step: Step
-) -> tuple[FittedCandidate, ...]:
-    """The candidates for one more effect beside those of `base`, the best first."""
-    step.at(0.0)
-    evidence = gather_evidence(context.measure, context.tuning, base)[0]
-    told = [effect for effect in catalogue if context.measure.can_observe(effect)]
-    short_form = short_recordings_of(context, base)
-    if short_form is None:
-        suggested = suggest_hypotheses(context, base.hypothesis, told, evidence)
-        known = sensitivity_at(context, base.deviations, base.hypothesis, with_forces=True)
-        step.at(0.2)
-        each = context.guard.over(context.map_, SCREENING)
-        screened = screen(context.measure, context.tuning, base, known, suggested, each)
-        fits = first_fits(context, base, known, screened)
-    else:
-        timeless = suggest_hypotheses(
-            context, base.hypothesis, [effect for effect in told if not effect.of_time], short_form.of(evidence)
-        )
-        timed = suggest_hypotheses(context, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
-        step.at(0.2)
-        fits = fits_on_short_recordings(context, short_form, base, timeless, timed)
-    step.at(0.6)
-    fitted_candidates = compare_candidates(context, base, fits)
-    return plainest_first(
-        [
-            candidate
-            for candidate in fitted_candidates
-            if not predicts_nothing(context.measure, base, candidate.fitted)
-            and within_data(candidate.fitted.hypothesis, evidence)
-        ]
-    )
-
-
-def is_worthwhile(base: FittedCandidate, better: FittedCandidate) -> bool:
-    """Whether an effect lowers the error enough to be added. Where only the worst channel is above the noise, and not
-    the mean over channels, its logarithm must fall by half."""
-    gained, over = base.score.mean_log_error - better.score.mean_log_error, np.log(base.score.worst_channel)
-    if excess(base) == 0 and over > np.log(NOISE_ALONE) and np.log(better.score.worst_channel) > over / 2:
-        return False
-    return gained > max(ADDED_SHARE * excess(base), ADDED_GAIN)
 
 
 _ORDINALS = ("first", "second", "third")

@@ -6,8 +6,6 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, hypothesis_of_claim
-from analysis.diagnosis.search.parsimony import excludes
-from analysis.diagnosis.search.search_context import STARTING, SearchContext
 from analysis.diagnosis.settings import CLOCK_LEAST_SHARE, CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS, STARTS_PER_CLAIM
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.clock_drift import LARGEST_PPM
@@ -125,18 +123,3 @@ def _middle_period(evidence: Evidence) -> float:
     moving: FloatArray = (evidence.predicted - evidence.predicted.mean(axis=0)) / evidence.noise
     power = np.cumsum(np.sum(np.abs(np.fft.rfft(moving, axis=0)) ** 2, axis=1))
     return len(moving) / max(int(np.searchsorted(power, power[-1] / 2)), 1)
-
-
-def suggest_hypotheses(
-    context: SearchContext, held: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence
-) -> list[Hypothesis]:
-    """The hypotheses to try beside those that are held: each effect with its starting values, and drifts of the clock
-    by trial where there are reference recordings."""
-    suggested = [
-        hypothesis
-        for hypothesis in candidates(catalogue, evidence, context.guard.over(context.map_, STARTING))
-        if not any(excludes(claim, hypothesis.claims[0]) for claim in held.claims)
-    ]
-    if context.references is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held.claims):
-        suggested += context.guard.part(CLOCK_DRIFT, STARTING, lambda: clock_drift_by_trial(catalogue, evidence), ())
-    return suggested

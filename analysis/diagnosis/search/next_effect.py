@@ -1,0 +1,88 @@
+"""One step of forward selection: which effects of the catalogue lower the error most beside those that are held.
+
+Screened by linearisation, fitted by output error, compared: steps 2 to 5 of the theory of operation in `explain`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analysis.diagnosis.errors.hypothesis import Hypothesis
+from analysis.diagnosis.errors.output_error import Fitted, gather_evidence
+from analysis.diagnosis.search.compare_candidates import compare_candidates
+from analysis.diagnosis.search.no_prediction import predicts_nothing
+from analysis.diagnosis.search.parsimony import excludes, plainest_first
+from analysis.diagnosis.search.screening import screen
+from analysis.diagnosis.search.search_context import (
+    SCREENING,
+    STARTING,
+    FittedCandidate,
+    SearchContext,
+    first_fits,
+    sensitivity_at,
+)
+from analysis.diagnosis.search.short_recordings import fits_on_short_recordings, short_recordings_of
+from analysis.diagnosis.search.starting_hypotheses import CLOCK_DRIFT, candidates, clock_drift_by_trial, within_data
+from analysis.diagnosis.types import Progress
+from equalizer.effects.effect import Effect
+from equalizer.effects.starts.evidence import Evidence
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Part of the work, for the progress display."""
+
+    what: str
+    begun: float
+    progress: Progress
+
+    def at(self, share: float) -> None:
+        self.progress(self.what, self.begun + 0.3 * share)
+
+
+def find_next_effect(
+    context: SearchContext, catalogue: Sequence[Effect], base: Fitted, step: Step
+) -> tuple[FittedCandidate, ...]:
+    """The candidates for one more effect beside those of `base`, the best first."""
+    step.at(0.0)
+    evidence = gather_evidence(context.measure, context.tuning, base)[0]
+    told = [effect for effect in catalogue if context.measure.can_observe(effect)]
+    short_form = short_recordings_of(context, base)
+    if short_form is None:
+        suggested = _suggest_hypotheses(context, base.hypothesis, told, evidence)
+        known = sensitivity_at(context, base.deviations, base.hypothesis, with_forces=True)
+        step.at(0.2)
+        each = context.guard.over(context.map_, SCREENING)
+        screened = screen(context.measure, context.tuning, base, known, suggested, each)
+        fits = first_fits(context, base, known, screened)
+    else:
+        timeless = _suggest_hypotheses(
+            context, base.hypothesis, [effect for effect in told if not effect.of_time], short_form.of(evidence)
+        )
+        timed = _suggest_hypotheses(context, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
+        step.at(0.2)
+        fits = fits_on_short_recordings(context, short_form, base, timeless, timed)
+    step.at(0.6)
+    fitted_candidates = compare_candidates(context, base, fits)
+    return plainest_first(
+        [
+            candidate
+            for candidate in fitted_candidates
+            if not predicts_nothing(context.measure, base, candidate.fitted)
+            and within_data(candidate.fitted.hypothesis, evidence)
+        ]
+    )
+
+
+def _suggest_hypotheses(
+    context: SearchContext, held: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence
+) -> list[Hypothesis]:
+    """The hypotheses to try beside those that are held: each effect with its starting values, and drifts of the clock
+    by trial where there are reference recordings."""
+    suggested = [
+        hypothesis
+        for hypothesis in candidates(catalogue, evidence, context.guard.over(context.map_, STARTING))
+        if not any(excludes(claim, hypothesis.claims[0]) for claim in held.claims)
+    ]
+    if context.references is not None and not any(claim.effect.name == CLOCK_DRIFT for claim in held.claims):
+        suggested += context.guard.part(CLOCK_DRIFT, STARTING, lambda: clock_drift_by_trial(catalogue, evidence), ())
+    return suggested
