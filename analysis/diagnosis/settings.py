@@ -106,7 +106,7 @@ SEARCH_ON = 1.12  # error from which a further effect is looked for; principle: 
 ADDED_SHARE = 0.15  # of what is left above the noise that an effect must take to be added,
 ADDED_GAIN = 0.003  # and the least gain
 
-# Which of several explanations is preferred (`same_within_errors`, `parsimony`). By hand.
+# Which of several explanations is preferred (`parsimony`). By hand.
 NOISE_KNOWN_TO = 0.01  # gain that the best of models may leave; principle: a noise is not known better
 AS_GOOD_GAIN = 0.0015  # gain below which explanations are as good: a hundred times chance in a minute of six channels
 AS_GOOD_SHARE = 0.1  # or as a share of what the better one leaves above the noise

@@ -23,7 +23,7 @@ from analysis.diagnosis.discovery.view_terms import view_terms
 from analysis.diagnosis.errors.hypothesis import without_claim
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.same_within_errors import is_worthwhile
+from analysis.diagnosis.search.parsimony import is_worthwhile
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import limit_map
 from analysis.diagnosis.settings import (

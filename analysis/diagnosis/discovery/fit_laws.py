@@ -14,7 +14,7 @@ from analysis.diagnosis.discovery.snap_exponents import is_whole_limit
 from analysis.diagnosis.errors.hypothesis import combine
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.same_within_errors import inseparable
+from analysis.diagnosis.search.parsimony import inseparable
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, FittedCandidate, SearchContext, sensitivity_at
 from analysis.diagnosis.search.time_budget import OutOfTimeError
 from analysis.diagnosis.settings import AT_RETUNING_BOUND, LAW_NEAR, RETUNING_BOUND

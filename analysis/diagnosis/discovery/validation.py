@@ -20,7 +20,7 @@ from analysis.diagnosis.discovery.snap_exponents import snap_exponents
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.same_within_errors import excess, inseparable
+from analysis.diagnosis.search.parsimony import excess, inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_SAME, LAW_STABLE, LOUDER, NOISE_KNOWN_TO
 from analysis.wording import conjoin

@@ -30,7 +30,7 @@ from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.next_effect import Step, find_next_effect
-from analysis.diagnosis.search.same_within_errors import excess, inseparable, is_worthwhile
+from analysis.diagnosis.search.parsimony import excess, inseparable, is_worthwhile
 from analysis.diagnosis.search.search_context import (
     FittedCandidate,
     SearchContext,

@@ -14,7 +14,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.next_effect import Step, find_next_effect
-from analysis.diagnosis.search.same_within_errors import is_worthwhile
+from analysis.diagnosis.search.parsimony import is_worthwhile
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
 from analysis.diagnosis.settings import SEARCH_ON

@@ -33,8 +33,8 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, begin, explain, is_worth_searching
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
+from analysis.diagnosis.search.parsimony import is_worthwhile
 from analysis.diagnosis.search.revise_selection import exchange_effects, without_effect
-from analysis.diagnosis.search.same_within_errors import is_worthwhile
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, shows_there_alone
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.document import Verdict
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.same_within_errors import excess
+from analysis.diagnosis.search.parsimony import excess
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import (
     CONFIRMED_SHARE,

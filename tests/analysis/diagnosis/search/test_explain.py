@@ -11,7 +11,7 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.search import explain
 from analysis.diagnosis.search.explain import _look_ahead
-from analysis.diagnosis.search.same_within_errors import is_worthwhile
+from analysis.diagnosis.search.parsimony import is_worthwhile
 from analysis.diagnosis.search.search import ONLY_REFINES
 from analysis.diagnosis.settings import ADDED_GAIN, INTERVAL_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS

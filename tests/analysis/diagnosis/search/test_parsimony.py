@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.search.parsimony import both_stand, only_refines, plainest_first
-from analysis.diagnosis.search.same_within_errors import excess, inseparable
+from analysis.diagnosis.search.parsimony import both_stand, excess, inseparable, only_refines, plainest_first
 
 
 def first_of(*fitted_candidates):

@@ -5,7 +5,7 @@ import numpy as np
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import Fitted
-from analysis.diagnosis.search.same_within_errors import inseparable
+from analysis.diagnosis.search.parsimony import inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate
 
 
