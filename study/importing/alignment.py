@@ -45,9 +45,9 @@ def align_signals(loggers: tuple[Logger, ...], say: Callable[[str], None]) -> tu
 def _with_offset(first: Logger, other: Logger, say: Callable[[str], None]) -> Logger:
     clock = other.clock
     if clock.align:
-        offset_s, how = _by_correlation(first, other)
+        offset_s, how = _align_by_correlation(first, other)
     elif clock.trigger:
-        offset_s, how = _by_trigger(first, other)
+        offset_s, how = _align_by_trigger(first, other)
     else:
         offset_s, how = clock.offset_s, "as the map states"
     moved_ms = typeset(f"{offset_s * 1e3:.4g}")
@@ -55,7 +55,7 @@ def _with_offset(first: Logger, other: Logger, say: Callable[[str], None]) -> Lo
     return replace(other, base=replace(other.base, offset_s=offset_s))
 
 
-def _by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
+def _align_by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
     clock = other.clock
     reference = first.base.samples(first.line(clock.align_to))
     own = other.base.samples(other.line(clock.align))
@@ -69,7 +69,7 @@ def _by_correlation(first: Logger, other: Logger) -> tuple[float, str]:
     return found.offset_s, how
 
 
-def _by_trigger(first: Logger, other: Logger) -> tuple[float, str]:
+def _align_by_trigger(first: Logger, other: Logger) -> tuple[float, str]:
     clock = other.clock
     here_s = _find_crossing_s(other, clock.trigger, clock.trigger_level)
     there_s = _find_crossing_s(first, clock.reference_trigger, clock.reference_level)

@@ -104,14 +104,14 @@ class TimeBase:
 def time_base(clock: ClockMap, names: Namespace) -> TimeBase:
     """Time base without the offset to other clocks. Raises ImportProblemError."""
     if clock.time:
-        return _from_stamps(clock, names)
+        return _base_from_stamps(clock, names)
     rate_hz = NUMBERED_HZ if clock.unknown else clock.rate_hz or names.number(clock.rate)
     if not rate_hz > 0:
         raise ImportProblemError(f"clock '{clock.name}': its rate, {clock.rate}, is {rate_hz:g}; it must be above 0")
     return TimeBase(clock.name, rate_hz, None, None, clock.gap_s or 1.5 / rate_hz)
 
 
-def _from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
+def _base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
     try:
         unit = parse_unit(clock.time_unit)
     except UnknownUnitError as error:

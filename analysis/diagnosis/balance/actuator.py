@@ -135,7 +135,7 @@ def find_actuator(balance: Balance, driven: DrivenAxis, without: frozenset[str],
     turned = InverseBalance(
         search, map_, any(each.law.effect in HOLDS_AT_REST and each.gain_low > 0 for each in balance.laws), target
     )
-    instead = _in_place_of_motion(turned, kinds, tuple(each.place for each in balance.named))
+    instead = _replace_motion_laws(turned, kinds, tuple(each.place for each in balance.named))
     if instead is not None:
         return instead
     # Laws of the position are left out where the balance is solved for it: they would reproduce it.
@@ -183,7 +183,7 @@ def _worth_trying(turned: InverseBalance, kinds: Kinds, most: float, beside: tup
     return [law for near, laws in kinds if near is None or turned.least_error(near, beside) <= most for law in laws]
 
 
-def _in_place_of_motion(turned: InverseBalance, kinds: Kinds, named: tuple[int, ...]) -> Actuator | None:
+def _replace_motion_laws(turned: InverseBalance, kinds: Kinds, named: tuple[int, ...]) -> Actuator | None:
     """Whether a law of the command alone explains most of the residual of the named laws of the motion, or has a
     smaller error than several of them: they had compensated for it, as a drag does for an actuator whose gain falls."""
     if not named:

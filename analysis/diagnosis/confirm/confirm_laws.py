@@ -5,7 +5,7 @@ model's errors is unknown: a residual in units of noise says nothing, and the ev
 balance compares forces, where a wrong law may explain the model's own errors; a simulation compares responses.
 
 1. The named laws are added to the re-tuned model one after the other and fitted by output error, starting from the
-   balance's parameters, or from the model's own where these fail (`_from_starts`).
+   balance's parameters, or from the model's own where these fail (`_fit_from_starts`).
 2. With E the mean log error on held-out samples, the laws are confirmed if
 
        E(with laws) <= E(without) + ln(CONFIRMED_LEAVES)         (a tenth less error)
@@ -101,7 +101,7 @@ def _confirm(begun: _Confirming, named: Sequence[tuple[int, JudgedLaw]]) -> tupl
     """The result with those of the laws that simulations confirm, and these laws; None where there are none."""
     context, named = begun.context, refit_laws(begun.balances, named)
     while named:
-        steps, after = _from_starts(context, begun.balances, (begun.retuned, begun.plain), named)
+        steps, after = _fit_from_starts(context, begun.balances, (begun.retuned, begun.plain), named)
         explained = Explanation(begun.before, begun.confirmed, after, tuple((step,) for step in steps), tuple(steps))
         vague: int | None = len(named) - 1
         errors: FloatArray | None = None
@@ -135,7 +135,7 @@ def _remove_law(named: _Named, place: int, instead: tuple[int, JudgedLaw] | None
     return [*named[:place], *([] if instead is None else [instead]), *named[place + 1 :]]
 
 
-def _from_starts(
+def _fit_from_starts(
     context: SearchContext,
     balances: Sequence[Balance],
     without: tuple[FittedCandidate, FittedCandidate],

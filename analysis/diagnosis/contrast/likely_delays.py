@@ -24,7 +24,7 @@ def likely_delays_s(compared_bases: Sequence[ComparedBase]) -> tuple[float, ...]
     """Delays of the faulty responses behind the commands: per base of the device, the delay by cross-correlation, if it
     is at least one row, and delays up to half a row away from it."""
     found = []
-    for compared in _of_device(compared_bases):
+    for compared in _bases_of_device(compared_bases):
         late = _rows_late(compared)
         found += [float(late + by) * compared.row_s for by in _offsets_around() if late]
     return tuple(dict.fromkeys(found))
@@ -34,7 +34,7 @@ def likely_clock_rates(compared_bases: Sequence[ComparedBase]) -> tuple[ClockRat
     """Clock rates at which the delay grows over the faulty set: per base of the device, the most likely one, if it
     amounts to at least a row at the end, and those within half a row there."""
     found = []
-    for compared in _of_device(compared_bases):
+    for compared in _bases_of_device(compared_bases):
         for runs_on in (True, False) if any(part.start > 0 for part in compared.faulty.parts) else (True,):
             rate, end = _likeliest_rate(compared, runs_on)
             if abs(rate) * end >= 1:
@@ -47,7 +47,7 @@ def _offsets_around() -> list[float]:
     return [float(by) for by in np.arange(-0.5, 0.51, LATE_STEP)]
 
 
-def _of_device(compared_bases: Sequence[ComparedBase]) -> list[ComparedBase]:
+def _bases_of_device(compared_bases: Sequence[ComparedBase]) -> list[ComparedBase]:
     return [compared for compared in compared_bases if not isinstance(compared.base, SensorBase)]
 
 

@@ -75,13 +75,13 @@ def _best_of(tried: Sequence[Tried], bare: Sequence[Pair], compared_bases: Seque
     first = min(tried, key=_error_of)
     if not first[2].exact:
         return _approach(first, bare, compared_bases)
-    at_size_1 = sorted(tried, key=lambda each: _error_of(_at_allowed_size(each)))[:VARIANTS_APPROACHED]
+    at_size_1 = sorted(tried, key=lambda each: _error_of(_fit_allowed_size(each)))[:VARIANTS_APPROACHED]
     return min((_approach(each, bare, compared_bases) for each in (first, *at_size_1)), key=_error_of)
 
 
 def _approach(found: Tried, bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]) -> Tried:
     """The fault linearised repeatedly about the size that was found: far from it, the change is only extrapolated."""
-    best = _at_allowed_size(found)
+    best = _fit_allowed_size(found)
     for _ in range(UNDOING_ROUNDS):
         fit, fault, variant, _ = found
         if variant.about is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
@@ -90,13 +90,13 @@ def _approach(found: Tried, bare: Sequence[Pair], compared_bases: Sequence[Compa
         if again is None:
             break
         found, before = again, best
-        best = min(best, _at_allowed_size(found), key=_error_of)
+        best = min(best, _fit_allowed_size(found), key=_error_of)
         if best is before and not variant.exact:
             break
     return best
 
 
-def _at_allowed_size(found: Tried) -> Tried:
+def _fit_allowed_size(found: Tried) -> Tried:
     _, fault, variant, pairs = found
     return (fit_sizes(pairs, allowed_sizes(variant)), fault, variant, pairs) if variant.exact else found
 

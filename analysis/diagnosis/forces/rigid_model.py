@@ -44,7 +44,7 @@ def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
         raise MechanicalModelError(("neither positions nor velocities were measured",))
     floors = [noise_floor(record.recording) for record in records]
     for _ in range(_ROUNDS):
-        model = _by_forces(model, force_views(records, model, floors).measure)
+        model = _fit_to_forces(model, force_views(records, model, floors).measure)
     return model
 
 
@@ -61,7 +61,7 @@ def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
     return MechanicalModel(name, recording.response.quantities[0], eye, 0 * eye, 0 * eye, eye, eye, rotational=turning)
 
 
-def _by_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
+def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
     rows, aims = [], []
     for record, motion in zip(measure.records, measure.motions, strict=True):
         motion_and_force = required_force(model, motion)

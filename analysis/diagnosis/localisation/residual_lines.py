@@ -87,15 +87,15 @@ def residual_lines(recording: Recording, observation: Observation, used: Mask) -
         if index in periods:
             starts = tuple(s for s in periods[index].starts if whole[s : s + segment.period].all())
             if starts:
-                found += _of_periods(
+                found += _lines_of_periods(
                     recording, observation, left, Periods(index, segment, starts, periods[index].settled)
                 )
         else:
-            found += _of_windows(recording, observation, left, (segment, whole))
+            found += _lines_of_windows(recording, observation, left, (segment, whole))
     return found
 
 
-def _of_periods(
+def _lines_of_periods(
     recording: Recording, observation: Observation, left: FloatArray, periods: Periods
 ) -> list[ResidualLines]:
     excitation = mean_spectrum(instrument_signal(recording), periods)
@@ -119,7 +119,7 @@ def _of_periods(
     return found
 
 
-def _of_windows(
+def _lines_of_windows(
     recording: Recording, observation: Observation, left: FloatArray, where_used: tuple[Segment, Mask]
 ) -> list[ResidualLines]:
     segment, whole = where_used

@@ -50,7 +50,7 @@ def noise_floor(recording: Recording) -> NoiseFloor:
     be white; else `how` is "unknown" and every rms NaN."""
     periods = tuple(period for period in settled_periods(recording) if period.count > 1)
     if periods:
-        return _from_repeats(recording, periods)
+        return _estimate_from_repeats(recording, periods)
     rate = recording.sample_rate_hz
     lines_hz: FloatArray = np.arange(1.0, _LINES + 1) * (rate / 2 / (_LINES + 1))
     signals = [recording.response] + ([] if recording.position is None else [recording.position])
@@ -84,7 +84,7 @@ def _build_floor(
     return NoiseFloor(how, lines_hz, channels[0], channels[1] if len(channels) > 1 else None, (remark,))
 
 
-def _from_repeats(recording: Recording, periods: Sequence[Periods]) -> NoiseFloor:
+def _estimate_from_repeats(recording: Recording, periods: Sequence[Periods]) -> NoiseFloor:
     lines_hz = max(periods, key=lambda period: period.length).frequency_hz(recording.sample_rate_hz)
     response = repeat_noise(recording, recording.response.samples, periods, lines_hz)
     remarks = _varying_remarks(recording.response, response)

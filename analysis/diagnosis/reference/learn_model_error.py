@@ -83,7 +83,7 @@ def learn_model_error(
     floor = learn_floor([lesson.cells for lesson in lessons])
     largest = np.max([lesson.channels for lesson in lessons], axis=0)
     floor = replace(floor, error=error, recordings=len(clean), channels=tuple(largest.tolist()))
-    return _with_colour(floor, lessons, map_)
+    return _whiten_floor(floor, lessons, map_)
 
 
 def learn_model_floor(
@@ -105,7 +105,7 @@ def require_alike(learned_by: str, error: str) -> None:
         )
 
 
-def _with_colour(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> LearnedError:
+def _whiten_floor(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> LearnedError:
     residuals = [each for lesson in lessons for each in lesson.residuals]
     whitening = whitening_filter(residuals, np.min([lesson.measure.noise for lesson in lessons], axis=0))
     shares = [

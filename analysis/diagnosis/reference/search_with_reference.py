@@ -35,10 +35,10 @@ def search_with_reference(
     Where the residual is much larger than that, whitening helps little: then effects are also searched for with the
     plain residual, and the result with the smaller error is kept.
     """
-    fine = _unname_what_was_there(_by_contrast(context, learned, catalogue, progress, time_left), learned)
+    fine = _unname_what_was_there(_search_by_contrast(context, learned, catalogue, progress, time_left), learned)
     if context.certain or fine.found.after.score.worst_channel <= learned.floor.beyond or not time_left():
         return fine
-    coarse = _unname_what_was_there(_by_size(context, learned, catalogue, progress, time_left), learned)
+    coarse = _unname_what_was_there(_search_by_size(context, learned, catalogue, progress, time_left), learned)
     return (
         coarse
         if coarse.judgement.named and _mean_log_error(fine.context, coarse) < _mean_log_error(fine.context, fine)
@@ -69,7 +69,7 @@ def _mean_log_error(context: SearchContext, seen: SearchResult) -> float:
     return FittedCandidate(fitted, fit_score(context.measure, fitted.residuals)).score.mean_log_error
 
 
-def _by_size(
+def _search_by_size(
     context: SearchContext,
     learned: LearnedError,
     catalogue: Sequence[Effect],
@@ -84,7 +84,7 @@ def _by_size(
     return replace(seen, context=own, found=_refit_by(own, seen.found))
 
 
-def _by_contrast(
+def _search_by_contrast(
     context: SearchContext,
     learned: LearnedError,
     catalogue: Sequence[Effect],

@@ -20,7 +20,7 @@ def errors_of(measure: ErrorMeasure, found: Explanation) -> Fit:
     """Rms error relative to the rms signal, root mean square over the channels. "fit" includes the samples to choose
     by."""
     if found.statistic is not None:
-        return Fit(*(_by_statistic(found, found.statistic, parts) for parts in (("fit", "choose"), ("test",))))
+        return Fit(*(_log_errors(found, found.statistic, parts) for parts in (("fit", "choose"), ("test",))))
     return Fit(_errors(measure, found, ("fit", "choose")), _errors(measure, found, ("test",)))
 
 
@@ -30,7 +30,7 @@ def channel_errors(found: Explanation, names: tuple[str, ...]) -> Mapping[str, M
     return {stage: dict(zip(names, candidate.score.test.tolist(), strict=True)) for stage, candidate in stages.items()}
 
 
-def _by_statistic(found: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
+def _log_errors(found: Explanation, statistic: Statistic, parts: tuple[str, ...]) -> Errors:
     """Root mean square over the channels of the logarithmic error of a prediction."""
 
     def error(candidate: FittedCandidate) -> float | None:

@@ -22,17 +22,17 @@ _LOSSES = 1e-6
 def implausible_sentences(found: Findings) -> tuple[str, ...]:
     """Sentences on implausible parameters of the effects, on their intervals, and on the improved model."""
     return (
-        *(sentence for placed in found.named for sentence in _of_effect(placed, found)),
-        *(sentence for effect in found.diagnosis.effects for sentence in _of_interval(effect, found.named)),
-        *_of_model(found.improved),
+        *(sentence for placed in found.named for sentence in _effect_doubts(placed, found)),
+        *(sentence for effect in found.diagnosis.effects for sentence in _interval_doubts(effect, found.named)),
+        *_model_doubts(found.improved),
     )
 
 
-def _of_effect(placed: PlacedEffect, found: Findings) -> Iterator[str]:
+def _effect_doubts(placed: PlacedEffect, found: Findings) -> Iterator[str]:
     noun, values = noun_of(placed.effect.name), placed.values
     for parameter in placed.effect.parameters:
         value = values[parameter.name]
-        if not parameter.fixed and _at_an_edge(value, parameter):
+        if not parameter.fixed and _is_at_bound(value, parameter):
             text = value_text(value, _unit(placed.effect.name, parameter.name, found))
             yield (
                 f"The {parameter.name.replace('_', ' ')} of {noun} ran into the end of what was allowed ({text}): the "
@@ -42,12 +42,12 @@ def _of_effect(placed: PlacedEffect, found: Findings) -> Iterator[str]:
         yield "Friction came out smaller at rest than in motion, which real surfaces seldom do."
 
 
-def _at_an_edge(value: float, parameter: Parameter) -> bool:
+def _is_at_bound(value: float, parameter: Parameter) -> bool:
     edges = [edge for edge in (parameter.lower, parameter.upper) if edge != parameter.none]
     return any(np.isclose(value, edge, rtol=_AT_THE_EDGE, atol=0.0) for edge in edges if edge)
 
 
-def _of_interval(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iterator[str]:
+def _interval_doubts(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iterator[str]:
     placed = next((placed for placed in named if placed.effect.name == effect.effect), None)
     for parameter in placed.effect.parameters[:1] if placed is not None else ():
         estimate = effect.parameters.get(parameter.name)
@@ -59,7 +59,7 @@ def _of_interval(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iterator
             yield f"The interval of {noun_of(effect.effect)}, {text}, holds no effect at all: the data hardly bear it."
 
 
-def _of_model(improved: MechanicalModel) -> Iterator[str]:
+def _model_doubts(improved: MechanicalModel) -> Iterator[str]:
     for name, matrix in (("damping", improved.damping), ("stiffness", improved.stiffness)):
         lowest, largest = _ends(matrix)
         if lowest < -_LOSSES * max(largest, 1e-300):

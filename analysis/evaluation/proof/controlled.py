@@ -27,7 +27,7 @@ def judge_control(name: str, claim: str, answers: Sequence[Diagnosis | None]) ->
     return ControlOutcome(name, claim, CLAIMS[claim](answers), tuple(map(_answer_text, answers)))
 
 
-def _no_name(answers: Sequence[Diagnosis | None]) -> bool:
+def _names_nothing(answers: Sequence[Diagnosis | None]) -> bool:
     return not any(
         effect.probability >= CONFIDENT for answer in answers if answer is not None for effect in answer.effects
     )
@@ -80,7 +80,7 @@ def _answer_text(diagnosis: Diagnosis | None) -> str:
 
 
 CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {
-    "no name": _no_name,
+    "no name": _names_nothing,
     "not explained": _not_explained,
     "nothing": _no_mismatch,
     "same": _same_answers,

@@ -123,15 +123,15 @@ def kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
     kinds = [change.name for change in CHANGES if any(row.change == change.name for row in changed)]
     return (
         share("changes named", changed, lambda each: each.right),
-        share("nothing changed, nothing named", _with_change(rows, NOTHING), lambda each: each.right),
-        share("written numbers inside their interval", _with_interval(rows), lambda each: bool(each.inside)),
-        *(share(kind, _with_change(rows, kind), lambda each: each.right) for kind in kinds),
+        share("nothing changed, nothing named", _rows_with_change(rows, NOTHING), lambda each: each.right),
+        share("written numbers inside their interval", _rows_with_interval(rows), lambda each: bool(each.inside)),
+        *(share(kind, _rows_with_change(rows, kind), lambda each: each.right) for kind in kinds),
     )
 
 
-def _with_change(rows: Sequence[Scored], change: str) -> list[Scored]:
+def _rows_with_change(rows: Sequence[Scored], change: str) -> list[Scored]:
     return [row for row in rows if row.change == change]
 
 
-def _with_interval(rows: Sequence[Scored]) -> list[Scored]:
+def _rows_with_interval(rows: Sequence[Scored]) -> list[Scored]:
     return [row for row in rows if row.inside is not None]

@@ -83,7 +83,7 @@ def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Sco
     return Score(figures, calibration(outcomes), tuple(outcome for outcome in outcomes if is_miss(outcome)))
 
 
-def _of_kind(outcomes: Sequence[Outcome], kind: str, bank: str = "") -> list[Outcome]:
+def _select_kind(outcomes: Sequence[Outcome], kind: str, bank: str = "") -> list[Outcome]:
     return [outcome for outcome in outcomes if outcome.kind == kind and (not bank or outcome.bank == bank)]
 
 
@@ -94,9 +94,9 @@ def _select_detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
 def _single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     words = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
-        seen = _select_detectable(_of_kind(outcomes, "single", bank))
+        seen = _select_detectable(_select_kind(outcomes, "single", bank))
         yield share(f"named right{words[bank]}", seen, lambda each: each.right)
-    whole = _select_detectable(_of_kind(outcomes, "single"))
+    whole = _select_detectable(_select_kind(outcomes, "single"))
     yield share("named first, all banks", whole, lambda each: each.named_names[:1] == each.names)
     yield share("in the returned set", whole, lambda each: each.names[0] in each.returned)
     named = [each for each in whole if each.named]
@@ -106,7 +106,7 @@ def _single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     yield share("place", named, lambda each: each.named[0].place == each.concealed[0].place)
     sided = [each for each in named if each.right and each.concealed[0].axis is not None and len(each.axes) > 1]
     yield share("axis, of two or three", sided, lambda each: not is_on_other_axis(each))
-    singles = _of_kind(outcomes, "single")
+    singles = _select_kind(outcomes, "single")
     seen = [single for single in singles if single.seen_by_ideal_observer]
     yield share("single effects that count as detectable", singles, lambda each: each.detectable)
     yield share("named right, of those that an oracle sees", seen, lambda each: each.right)
@@ -115,28 +115,28 @@ def _single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
 
 
 def _null_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    yield share("nothing missing, yet named", _of_kind(outcomes, "nothing"), lambda each: bool(each.named))
-    clean = _of_kind(outcomes, "nothing")
+    yield share("nothing missing, yet named", _select_kind(outcomes, "nothing"), lambda each: bool(each.named))
+    clean = _select_kind(outcomes, "nothing")
     yield share("nothing missing, and said so", clean, lambda each: each.verdict in ("no_mismatch", "parameters"))
 
 
 def _open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    outside = _select_detectable(_of_kind(outcomes, "outside"))
+    outside = _select_detectable(_select_kind(outcomes, "outside"))
     yield share("outside the catalogue, not explained", outside, lambda each: each.verdict in NOT_EXPLAINED)
     yield share("outside the catalogue, no name at all", outside, lambda each: not each.named)
-    without = _select_detectable(_of_kind(outcomes, "without"))
+    without = _select_detectable(_select_kind(outcomes, "without"))
     yield share("without the true effect, any name", without, lambda each: bool(each.named))
     yield share("without the true effect, yet explained", without, lambda each: each.verdict == "explained")
 
 
 def _pair_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    pairs = _select_detectable(_of_kind(outcomes, "pair"))
+    pairs = _select_detectable(_select_kind(outcomes, "pair"))
     yield share("pairs, both and no other", pairs, lambda each: each.right)
     yield share("pairs, at least one", pairs, lambda each: bool(set(each.names) & set(each.named_names)))
 
 
 def _number_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
-    right = [each for each in _select_detectable(_of_kind(outcomes, "single")) if each.right]
+    right = [each for each in _select_detectable(_select_kind(outcomes, "single")) if each.right]
     errors = [main_error(each.concealed[0], each.named[0]) for each in right]
     yield statistic("main parameter's error, median", [e for e in errors if e is not None], np.median)
     covered = [list(interval_coverage(each.concealed[0], each.named[0]).values()) for each in right]

@@ -36,7 +36,7 @@ def draw_calibration(
     )
     sizes = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
     off = random.normal(size=9) * np.repeat(np.array(sizes, dtype=np.float64), 3)
-    return shift_diagonals(bench, off * _of_axes(axes)), tolerance
+    return shift_diagonals(bench, off * _axes_mask(axes)), tolerance
 
 
 def retune(
@@ -46,7 +46,7 @@ def retune(
     at 1.5 N (Gauss-Newton), and its tolerance."""
     parts = [s for s in plan.segments if s.role == "fit" and s.amplitude == LEVELS_N[1]]
     commands = [plan.command[s.start : s.stop] for s in parts]
-    seen, free = list(axes), _of_axes(axes)
+    seen, free = list(axes), _axes_mask(axes)
     noise = np.array(NOISE_MPS2)[seen]
     wanted = np.vstack([response[s.start : s.stop, seen] for s in parts]) / noise
     steps = np.repeat((1e-3, 1e-2, 1.0), 3)
@@ -87,7 +87,7 @@ def as_model(name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...
     )  # fmt: skip
 
 
-def _of_axes(axes: tuple[int, ...]) -> FloatArray:
+def _axes_mask(axes: tuple[int, ...]) -> FloatArray:
     """(9,): 1 for the parameters of these axes, otherwise 0."""
     mask: FloatArray = np.array([float(axis in axes) for axis in range(3)] * 3)
     return mask

@@ -66,8 +66,8 @@ def read(
     part = np.linspace(0.0, 1.0, len(felt))[:, None]
     turns = 2 * np.pi * sensor.hum_hz * np.arange(len(felt))[:, None] / rate_hz
     felt = felt + sensor.offset + sensor.drift * part + sensor.hum[0] * np.sin(turns) + sensor.hum[1] * np.cos(turns)
-    felt = _at_other_times(felt, sensor.ppm, sensor.late_s * rate_hz)
-    where = _at_other_times(position, sensor.ppm, 0.0)
+    felt = _resample(felt, sensor.ppm, sensor.late_s * rate_hz)
+    where = _resample(position, sensor.ppm, 0.0)
     felt = np.clip(felt + random.normal(size=felt.shape) * NOISE_MPS2, -sensor.limit, sensor.limit)
     if sensor.step > 0.0:
         felt = sensor.step * np.round(felt / sensor.step)
@@ -86,7 +86,7 @@ def _apply_nonlinearity(sensor: Sensor, felt: FloatArray) -> FloatArray:
     return felt if sensor.play == 0.0 else play_hysteresis(felt, sensor.play)
 
 
-def _at_other_times(samples: FloatArray, ppm: float, late: float) -> FloatArray:
+def _resample(samples: FloatArray, ppm: float, late: float) -> FloatArray:
     """Resample with linear interpolation for a clock error (ppm) and a delay. late: in samples."""
     if ppm == 0.0 and late == 0.0:
         return samples

@@ -95,7 +95,7 @@ def diagnose_real(wanted: RealRecording, time_left: TimeBudget, guard: Guard, on
     except (NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         return RealDiagnosis(_refusal(wanted, f"The fits broke down: {refusal}."), None, parents)
     further = tuple(_test_on_further(each, wanted, found) for each in wanted.tests)
-    pair = None if case.before is None else _before_and_after(wanted, case, found)
+    pair = None if case.before is None else _compare_pair(wanted, case, found)
     objections = (
         *diagnosis.objections,
         *(objection for each in wanted.tests for objection in each.source.map.diagnosis.objections),
@@ -233,7 +233,7 @@ def _require_retuned(found: Findings) -> MechanicalModel:
     return found.retuned
 
 
-def _before_and_after(wanted: RealRecording, case: _ImportedCase, found: Findings) -> PairOutcome:
+def _compare_pair(wanted: RealRecording, case: _ImportedCase, found: Findings) -> PairOutcome:
     assert wanted.before is not None and case.before is not None
     given = prediction_error(case.recording, case.model, "test")
     missed = prediction_error(case.before, case.model, "test")

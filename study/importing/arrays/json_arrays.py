@@ -101,13 +101,13 @@ def _arrays_of_object(value: Mapping[str, Any], place: tuple[str, ...]) -> Itera
             if key == values:
                 yield (*place[:-1], with_units([place[-1]], units)[0]), _array(entry)
             elif key not in _UNIT_KEYS:
-                yield from _beside_values(entry, (*place, key))
+                yield from _arrays_beside_values(entry, (*place, key))
         return
     for key, entry in value.items():
         yield from _arrays(entry, (*place, key))
 
 
-def _beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
+def _arrays_beside_values(entry: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
     """Texts beside values, as their description. Raises ValueError for keys that may change the values, such as a
     scale."""
     if entry is not None and (not isinstance(entry, str) or is_number(entry.strip(), ".")):
@@ -144,7 +144,7 @@ def _array(value: Any) -> Array:
     placeholder for entries without numbers."""
     if isinstance(value, list) and value and all(_is_scalar(entry) for entry in value):
         if all(isinstance(entry, str) or entry is None for entry in value):
-            return _of_texts(["" if entry is None else entry.strip() for entry in value])
+            return _array_of_texts(["" if entry is None else entry.strip() for entry in value])
         if all(not isinstance(entry, str) or is_empty(entry) for entry in value):
             return np.array([np.nan if entry is None or isinstance(entry, str) else float(entry) for entry in value])
         return np.array([str(entry) for entry in value])
@@ -155,7 +155,7 @@ def _array(value: Any) -> Array:
     return found if found.dtype.kind in "fiub" else np.array(None, dtype=object)
 
 
-def _of_texts(texts: list[str]) -> Array:
+def _array_of_texts(texts: list[str]) -> Array:
     if all(is_number(text, ".") for text in texts):
         return np.array([np.nan if is_empty(text) else float(text) for text in texts])
     return np.array(texts)

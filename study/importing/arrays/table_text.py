@@ -54,7 +54,7 @@ def read_text(path: Path, encoding: str) -> TableText:
     try:
         return TableText(data.decode("utf-8-sig"), "")
     except UnicodeDecodeError:
-        return _of_other_encoding(data)
+        return _decode_other_encoding(data)
 
 
 def _decode(data: bytes, encoding: str) -> str:
@@ -68,7 +68,7 @@ def _decode(data: bytes, encoding: str) -> str:
         raise ValueError(f"it is no whole {encoding} text") from problem
 
 
-def _of_other_encoding(data: bytes) -> TableText:
+def _decode_other_encoding(data: bytes) -> TableText:
     """Detection from the lines beyond ASCII that are not remarks."""
     begin = data if len(data) <= _READ_FOR_WORDS else data[: data.rfind(b"\n", 0, _READ_FOR_WORDS) + 1]
     lines = [line for line in begin.splitlines() if not line.isascii() and not line.lstrip().startswith((b"#", b"%"))]

@@ -55,15 +55,15 @@ def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
         return None
     values = np.zeros(len(text))
     if has_clock.all():
-        values += _of_clock(text, parts)
+        values += _clock_seconds(text, parts)
     if has_date.all():
-        values += _of_dates(parts["date"])
+        values += _date_seconds(parts["date"])
     every = np.full(len(fields), np.nan)
     every[given.to_numpy()] = values
     return StampColumn(every, bool(has_date.all()), bool(has_clock.all()), str(text.iloc[0]))
 
 
-def _of_clock(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
+def _clock_seconds(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
     for place in np.flatnonzero((parts["minute"].astype(int) > 59) | (parts["second"].str[:2].astype(int) > 59)):
         raise ValueError(f"'{text.iloc[place]}' is no clock time, with more than 59 minutes or seconds")
     if parts["zone"].isna().any() != parts["zone"].isna().all():
@@ -82,7 +82,7 @@ def _zone_s(zone: str) -> float:
     return -ahead_s if zone.startswith("-") else ahead_s
 
 
-def _of_dates(dates: "pd.Series[str]") -> Seconds:
+def _date_seconds(dates: "pd.Series[str]") -> Seconds:
     """Seconds since the first date: seconds since 1970 would leave no digits for microseconds."""
     days: dict[str, float] = {}  # no value for a single date of ambiguous order
     several = dates.nunique() > 1

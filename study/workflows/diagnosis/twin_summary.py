@@ -45,11 +45,10 @@ def twin_summary(written: WrittenTwin) -> dict[str, Any]:
 def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
     """Lines for the terminal."""
     model, fit, tolerance = written.model, written.fit, written.model.tolerance
-    piece = written.piece
+    piece, mass_open = written.piece, _range(tolerance, "mass_kg")
     lines = [
-        f"As one rigid body, up to {piece.up_to_hz:.3g} Hz: mass {_values(piece.mass)} kg"
-        f"{_range(tolerance, 'mass_kg')}, damping {_values(piece.damping)} N s/m, "
-        f"{_values(piece.of_friction)} N s/m of it friction's and taken off"
+        f"As one rigid body, up to {piece.up_to_hz:.3g} Hz: mass {_values(piece.mass)} kg{mass_open}, "
+        f"damping {_values(piece.damping)} N s/m, {_values(piece.of_friction)} N s/m of it friction's and taken off"
         f"{_range(tolerance, 'damping_n_s_per_m')}",
     ]
     if modes := _modes_hz(written):

@@ -86,7 +86,7 @@ def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> 
         recordings = remove_effects(recordings, physics, plan.physics)
     try:
         found = identify_recordings(recordings, settings, plan.smooth, on_progress)
-        model = _at_place(plan, recordings, found.identified.model, physics)
+        model = _add_place(plan, recordings, found.identified.model, physics)
         tested = validate_on_test(model, recordings)
         model = replace(model, quality=_quality(found, recordings, tested))
     except (TransferEstimateError, IdentificationRefused) as refusal:
@@ -133,7 +133,7 @@ def _settings(plan: IdentifyPlan) -> IdentificationSettings:
         ) from problem
 
 
-def _at_place(
+def _add_place(
     plan: IdentifyPlan, recordings: Sequence[Recording], model: IdentifiedModel, physics: MechanicalModel | None
 ) -> IdentifiedModel:
     """The model with the place of its recordings and its provenance."""

@@ -68,7 +68,7 @@ def _is_folder(path: Path) -> bool:
 
 def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     if _is_foreign(path):
-        return _of_foreign(path)
+        return _validate_foreign(path)
     try:
         content = open_content(path)
         for recognise in recognisers:
@@ -84,7 +84,7 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     foreign = path.is_file() and path.suffix.lower() in (*FOREIGN, *HDF5)
     if not foreign or content.hdf5_format or content.json_format:
         return unknown
-    return _of_foreign(path, kind, unknown.problems)
+    return _validate_foreign(path, kind, unknown.problems)
 
 
 def _is_foreign(path: Path) -> bool:
@@ -96,7 +96,7 @@ def _is_foreign(path: Path) -> bool:
         return False
 
 
-def _of_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ()) -> Validation:
+def _validate_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ()) -> Validation:
     """A foreign recording, read as an import would read it. kind, unknown: of a file that may be a damaged one of our
     own, which is reported if it is no recording either."""
     # Imported here: the import takes longer to load than most files take to check.

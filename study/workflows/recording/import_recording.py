@@ -87,12 +87,12 @@ def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progr
     """Import recordings into memory; nothing is written. Raises StudyError."""
     if map_name is not None:
         source = read_map(map_name)
-        return _by_map(source, _expand_folders(files, source.map), on_progress)
+        return _import_by_map(source, _expand_folders(files, source.map), on_progress)
     if len(files) == 1 and files[0].is_dir():
-        return _by_found_map(files[0], on_progress)
+        return _import_by_found_map(files[0], on_progress)
     if all(is_hdf5(path) and format_of(path) == FORMAT for path in files):
         return _read_own(files)
-    return _by_header(files, on_progress)
+    return _import_by_header(files, on_progress)
 
 
 def _expand_folders(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...]:
@@ -109,16 +109,16 @@ def _expand_folders(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...
     return tuple(found)
 
 
-def _by_map(source: MapFile, files: Sequence[Path], on_progress: Progress) -> Foreign:
+def _import_by_map(source: MapFile, files: Sequence[Path], on_progress: Progress) -> Foreign:
     built = build_recording(source.map, files, on_progress)
     digest = hashlib.sha256(source.text.encode()).hexdigest()
     return Foreign(built.recording, tuple(files), source.name, digest, built.notes)
 
 
-def _by_found_map(folder: Path, on_progress: Progress) -> Foreign:
+def _import_by_found_map(folder: Path, on_progress: Progress) -> Foreign:
     found = find_map(folder)
     if len(found) == 1:
-        return _by_map(found[0].source, found[0].files, on_progress)
+        return _import_by_map(found[0].source, found[0].files, on_progress)
     if not found:
         by_header = map_by_header(folder)
         arrays = read_without_map(by_header.files[0])
@@ -145,11 +145,11 @@ def _read_own(files: Sequence[Path]) -> Foreign:
     return Foreign(joined, tuple(files), "recording", "", notes)
 
 
-def _by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
+def _import_by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
     arrays = read_without_map(files[0])
     wanted = header_map(arrays)
     if wanted is None and (shipped := map_of_files(files)) is not None:
-        found = _by_map(shipped, files, on_progress)
+        found = _import_by_map(shipped, files, on_progress)
         return replace(found, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *found.notes))
     if wanted is None:
         raise MapNeededError(files[0].name, "; ".join(header_problems(arrays)), map_skeleton(arrays))

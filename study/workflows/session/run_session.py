@@ -62,7 +62,7 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
         return _end_interrupted(sitting, interruption)
     except StudyError as error:
         sitting.device.stop()
-        raise _with_the_way_back(error, sitting) from error
+        raise _say_how_to_resume(error, sitting) from error
     except BaseException:
         sitting.device.stop()
         raise
@@ -114,7 +114,7 @@ def _end_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Sessi
     raise UserInterruptError("Interrupted", "The force was released.", way_back, saved) from interruption
 
 
-def _with_the_way_back(error: StudyError, sitting: Sitting) -> StudyError:
+def _say_how_to_resume(error: StudyError, sitting: Sitting) -> StudyError:
     """The same error with what is saved and how to continue."""
     with contextlib.suppress(StudyError):
         state = fold_session(sitting.folder).state

@@ -75,18 +75,18 @@ def signature_of(evidence: Evidence, complete: FloatArray, placed: PlacedEffect,
         return law
     acts, along = placed.effect.acts, ALONG.get(placed.effect.name, "frequency")
     if along in ("velocity", "position", "acceleration") and not isinstance(acts, (OnCommand, OnResponse)):
-        return _of_motion(evidence, placed, along, names, hold)
+        return _motion_signature(evidence, placed, along, names, hold)
     if along == "command" and isinstance(acts, OnCommand):
-        return _of_command(evidence, placed, names)
+        return _command_signature(evidence, placed, names)
     if along in ("reading", "time", "growth") and isinstance(acts, OnResponse):
         changed = acts.change(evidence.predicted, evidence.sample_rate_hz, placed.sites, placed.values)
         if along == "reading":
-            return _of_reading(evidence, placed, changed - evidence.predicted, names)
-        return _of_time(evidence, placed, changed - evidence.predicted, names, along)
-    return _of_frequency(evidence, complete - evidence.predicted, placed, names)
+            return _reading_signature(evidence, placed, changed - evidence.predicted, names)
+        return _time_signature(evidence, placed, changed - evidence.predicted, names, along)
+    return _frequency_signature(evidence, complete - evidence.predicted, placed, names)
 
 
-def _of_motion(evidence: Evidence, placed: PlacedEffect, along: Along, names: Names, hold: Hold) -> Signature:
+def _motion_signature(evidence: Evidence, placed: PlacedEffect, along: Along, names: Names, hold: Hold) -> Signature:
     axis = _strongest(placed.sites, evidence.axis_force)
     played = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (placed,), hold)
     force = played.axis_force
@@ -127,7 +127,7 @@ def _equivalent_force(evidence: Evidence, played: SimulationResult, hold: Hold) 
     return missing_force(evidence.model, np.hstack(change) / noise, noise, evidence.sample_rate_hz, expected).force
 
 
-def _of_command(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signature:
+def _command_signature(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signature:
     assert isinstance(placed.effect.acts, OnCommand)
     axis = _strongest(placed.sites, evidence.axis_force)
     command, used = evidence.command[:, axis], evidence.used > 0
@@ -141,7 +141,7 @@ def _of_command(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signa
     )  # fmt: skip
 
 
-def _of_reading(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names) -> Signature:
+def _reading_signature(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names) -> Signature:
     used = evidence.used > 0
     drives = evidence.predicted[used]
     # The pair of channels with the strongest effect: regression of the change in one channel on the signal of the
@@ -157,7 +157,9 @@ def _of_reading(evidence: Evidence, placed: PlacedEffect, change: FloatArray, na
     )  # fmt: skip
 
 
-def _of_time(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names, along: Along) -> Signature:
+def _time_signature(
+    evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names, along: Along
+) -> Signature:
     used, rate_hz = evidence.used > 0, evidence.sample_rate_hz
     here = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
     errors, seconds = (evidence.response - evidence.predicted)[:, here], np.arange(len(change)) / rate_hz
@@ -172,7 +174,7 @@ def _of_time(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names
     return Signature(placed.effect.name, names.channels[here], "time (s)", what, at, mean, spread, law_at, law)
 
 
-def _of_frequency(evidence: Evidence, change: FloatArray, placed: PlacedEffect, names: Names) -> Signature:
+def _frequency_signature(evidence: Evidence, change: FloatArray, placed: PlacedEffect, names: Names) -> Signature:
     rate_hz, used = evidence.sample_rate_hz, evidence.used > 0
     errors = evidence.response - evidence.predicted
     here = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))

@@ -12,7 +12,7 @@ from analysis.diagnosis.confirm import require_gain
 from analysis.diagnosis.confirm.confirm_laws import (
     VAGUE,
     _find_vague_law,
-    _from_starts,
+    _fit_from_starts,
     _prefer_special_case,
     open_refinements,
 )
@@ -123,7 +123,7 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
     monkeypatch.setattr(by_balance, "_steps", steps)
     monkeypatch.setattr(by_balance, "parameters_beside_laws", lambda tuning, balances, laws: np.array([1.0, -2.0]))
     context = SimpleNamespace(tuning=None, with_test_score=lambda candidate: candidate)
-    _, after = _from_starts(context, (), (ends_at(8.0), ends_at(8.0)), ())
+    _, after = _fit_from_starts(context, (), (ends_at(8.0), ends_at(8.0)), ())
     assert after.score.test[0] == end
     assert len(tried) == starts
 
@@ -148,7 +148,7 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
         "can_be_played": lambda own, weighed: True, "constants_of": lambda balances: SimpleNamespace(claims=()),
         "refit_laws": lambda balances, named: named, "evaluate_fit": lambda *of: given, "refine": lambda *of: 4.0,
         "final_errors": lambda *of: np.zeros(1), "_find_vague_law": lambda *of: None,
-        "_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)), "explains_half": lambda *of: predicts,
+        "_fit_from_starts": lambda *of: ([ends_at(1.1)], ends_at(1.1)), "explains_half": lambda *of: predicts,
         "open_refinements": lambda *of: (),
     }  # fmt: skip
     for name, stand_in in patched.items():
