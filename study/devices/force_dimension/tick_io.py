@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.newest_sample import CLIPPED, COUNT, FRESH_S, REST, ROWS, SENSED, TAKEN_S
-from study.devices.drive.compiled_drive import SENSE_SIGNATURE, WRITE_SIGNATURE
+from study.devices.drive.compiled_drive import CALLS, SENSE_SIGNATURE, WRITE_SIGNATURE
 from study.devices.force_dimension.handle import SCALED, STALE
 from study.devices.force_dimension.loop_cells import (
     BRAKES,
@@ -49,6 +49,7 @@ from study.devices.force_dimension.loop_cells import (
     record_library_failure,
 )
 from study.devices.governor.compiling import fingerprint, part
+from study.devices.governor.govern import VECTOR
 from study.devices.native import Addresses, acquire, call_int, now_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
 
@@ -65,6 +66,7 @@ A force whose peaks alone are scaled is so only for some milliseconds in a row, 
 
 ROUNDING = 1 + 1e-9
 """Factor on the cap that rounding may need."""
+REST_SIGNATURE = types.int64(CALLS, VECTOR, types.float64, VECTOR)
 LOCK_S = 0.002
 """Longest wait for the lock (s). A write lasts a tenth of it: a longer wait is for a call that hangs."""
 
@@ -207,6 +209,20 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     return code
 
 
+@part
+def _rest(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
+    """Repeat a zero where nothing is played. The lock is never kept while the interpreter is waited for: the loop's
+    next force waits no longer than `LOCK_S` for it."""
+    if not acquire(calls, LOCK_S):
+        return 0
+    code = 0
+    resting = cells[SENT_ZERO] != 0.0 and now_s(calls) - cells[SENT_S] >= every_s
+    if resting and cells[CLOSED] == 0.0 and cells[FAILED] == 0.0:
+        code = _send_force(calls, cells, force)
+    release(calls)
+    return code
+
+
 def _entry_points(sources: int) -> tuple[Any, Any, Any]:
     @njit(SENSE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def sense_once(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
@@ -218,16 +234,16 @@ def _entry_points(sources: int) -> tuple[Any, Any, Any]:
         _ = sources
         return _write(calls, cells, force)
 
-    @njit(WRITE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
-    def send_once(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+    @njit(REST_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def rest_once(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
         _ = sources
-        return _send_force(calls, cells, force)
+        return _rest(calls, cells, every_s, force)
 
-    return sense_once, write_once, send_once
+    return sense_once, write_once, rest_once
 
 
 _DEVICES = Path(__file__).parents[1]
-sense_once, write_once, send_once = _entry_points(
+sense_once, write_once, rest_once = _entry_points(
     fingerprint(
         Path(__file__).parent,
         *(
@@ -236,4 +252,5 @@ sense_once, write_once, send_once = _entry_points(
         ),
     )
 )
-"""The first two as `study.devices.rig.CompiledIo` wants them; `send_once`: what `write_once` does with the lock."""
+"""The first two as `study.devices.rig.CompiledIo` wants them; `rest_once(calls, cells, every_s, zero)`: repeats the
+zero where the last force was one, so long ago."""
