@@ -148,10 +148,11 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
         if code != 0:
             return code
     x, y, z = force[0], force[1], force[2]
+    began_s = now_s(calls)  # the device counts from when it got the force, which may be long before the call ends
     answer = _set_force(calls, cells, x, y, z)
     if answer < 0:
         return record_library_failure(cells, FORCE)
-    cells[SENT_S] = now_s(calls)
+    cells[SENT_S] = began_s
     note_sent(cells, x, y)
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
     cells[TOO_STRONG] = count_beyond_share(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
@@ -162,6 +163,7 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 @part
 def _send_zero(calls: Addresses, cells: FloatArray) -> int:
+    began_s = now_s(calls)
     if _set_force(calls, cells, 0.0, 0.0, 0.0) < 0:
         return record_library_failure(cells, FORCE)
     if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
@@ -172,7 +174,7 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
     note_sent(cells, 0.0, 0.0)
     cells[SENT_ZERO], cells[TOO_STRONG] = 1.0, 0.0
     if not _is_silent(calls, cells):
-        cells[SENT_S] = now_s(calls)
+        cells[SENT_S] = began_s
     return 0
 
 

@@ -1,9 +1,12 @@
-"""The zero that is repeated while nothing is played, in a thread of its own, delays no force of the loop."""
+"""Zeros while nothing is played: in a thread of its own, which delays no force of the loop, and counted as the device
+counts them."""
 
 import contextlib
 import ctypes
 import threading
+import time
 
+import numpy as np
 import pytest
 from numba import njit
 
@@ -51,3 +54,18 @@ def test_the_repeated_zero_keeps_the_lock_for_no_wait_for_the_interpreter(stub):
             keeper.join()
         assert stub.get("writes") > sent  # zeros were sent meanwhile
         assert longest_s < KEPT_S / 2
+
+
+@pytest.mark.parametrize("late_s", [0.02, 0.028])
+def test_a_device_that_let_go_while_a_zero_was_sent_late_is_woken_for_the_next_force(stub, late_s):
+    """Its watchdog counts from when the zero came, not from when the call ended: at the force it has let go."""
+    stub.set("stretch_in_use", 100)  # from the first force on: the computer of the tests may be busy
+    with contextlib.closing(stub.rig()) as rig:
+        stub.set("write_late_s", late_s)
+        stub.set("write_late_every", 1)
+        rig.write(np.zeros(3))
+        stub.set("write_late_every", 0)
+        time.sleep(rig.drops_force_after_s - late_s + 0.005)
+        assert not stub.get("force_on")
+        rig.write(np.array([0.5, 0.0, 0.0]))
+        assert stub.get("force_on") and stub.applied_n.any()
