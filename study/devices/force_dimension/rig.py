@@ -66,7 +66,8 @@ class ForceDimensionRig:
         self._cells[loop_cells.NUMBER] = handle.number
         self._cells[loop_cells.CAP_N] = min(cap_n, info.max_force_n)
         self._cells[loop_cells.DROPS_AFTER_S] = drops_force_after_s
-        self._cells[loop_cells.SENT_S], self._cells[loop_cells.SENT_ZERO] = time.monotonic(), 1.0
+        # How long ago the device got its last zero is not known: it is asked before the first force.
+        self._cells[loop_cells.SENT_S], self._cells[loop_cells.SENT_ZERO] = -math.inf, 1.0
         shared: FloatArray | None = getattr(accelerometer, "samples", None)
         self._samples: FloatArray = np.zeros((1, 1)) if shared is None else shared
         self._overlaid = accelerometer if shared is None else None

@@ -69,3 +69,20 @@ def test_a_device_that_let_go_while_a_zero_was_sent_late_is_woken_for_the_next_f
         assert not stub.get("force_on")
         rig.write(np.array([0.5, 0.0, 0.0]))
         assert stub.get("force_on") and stub.applied_n.any()
+
+
+def test_a_device_that_let_go_while_it_was_opened_is_woken_for_the_first_force(stub, vendor, monkeypatch):
+    """A busy computer may come back to the opening after the watchdog's time."""
+    stub.set("stretch_in_use", 100)
+    make_ready = vendor.make_ready
+
+    def make_ready_and_stand_still(*arguments) -> float:
+        drops_after_s: float = make_ready(*arguments)
+        time.sleep(drops_after_s + 0.02)
+        return drops_after_s
+
+    monkeypatch.setattr(vendor, "make_ready", make_ready_and_stand_still)
+    with contextlib.closing(stub.rig()) as rig:
+        assert not stub.get("force_on")
+        rig.write(np.array([0.5, 0.0, 0.0]))
+        assert stub.get("force_on") and stub.applied_n.any()
