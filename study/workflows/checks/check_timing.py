@@ -110,8 +110,9 @@ def _lateness_s(device: Device, clock: Clock, seconds: float, go_on: Callable[[f
     found = np.concatenate(after_due_s or [np.zeros(0)])
     if not len(found):
         return np.array([seconds])  # it never turned
-    so_far = np.concatenate(missed)
-    return found - found.min() + np.diff(so_far, prepend=so_far[:1]) / rate_hz
+    so_far: FloatArray = np.concatenate(missed)
+    late_s: FloatArray = found - found.min() + np.diff(so_far, prepend=so_far[:1]) / rate_hz
+    return late_s
 
 
 def _attend(device: Device, on_progress: Callable[[float], None], done_s: float) -> bool:
