@@ -12,6 +12,9 @@ from equalizer.tracking.realtime.realtime_controller import RealtimeController
 OF_CAP = 0.9
 """Largest force of a case over the cap, because the cap is not compared."""
 
+AFTER = 50
+"""Ticks of a case after the last row of the transient, and at least so many with a force of the stream."""
+
 NO_FORCE = 1e-12
 """Tolerance of a comparison, relative to the cap. A way whose largest force is below it counts as zero."""
 
@@ -38,10 +41,11 @@ class ControllerCases:
 
 
 def controller_cases(controller: RealtimeController, seed: int = 1) -> ControllerCases:
-    """Compute reference inputs and forces: as many ticks as the transient has rows and some after its end. Raises
-    TrackingError where one of the two ways gives no force at all: nothing could be compared."""
+    """Compute reference inputs and forces: as many ticks as the transient has rows, or the stream's preview takes, and
+    some after its end. Raises TrackingError where one of the two ways gives no force at all: nothing could be
+    compared."""
     draw, p = np.random.default_rng(seed), controller.problem.outputs
-    ticks = len(controller.transient) + 50
+    ticks = max(len(controller.transient), len(controller.tracker)) + AFTER
     rotations = np.cumsum(draw.standard_normal((ticks, p, p)), axis=0)
     rotations *= _cap_factor(play(controller.transient, rotations).forces, controller.cap_n, "transient")
     wanted = draw.standard_normal((ticks, p))

@@ -2,8 +2,8 @@
 order.
 
 A packet is looked for at every byte, so a garbled one hides none of its neighbours. A check sum is right by chance once
-in 65 536 times; so a packet counts when its number and time follow those of the one before, or, where the
-microcontroller began anew, when the next packet follows it.
+in 65 536 times; so a packet counts at once where number and time are those that come next at the board's rate, and
+otherwise, as after a stall or where the microcontroller began anew, when the next two packets follow it.
 
 A packet is 16 bytes, the low byte first (`docs/firmware/packet.h` makes the same): offset and length of
 
@@ -13,6 +13,10 @@ A packet is 16 bytes, the low byte first (`docs/firmware/packet.h` makes the sam
  8  6  raw values of x, y, z
 14  2  CRC-16/CCITT-FALSE (polynomial 1021, from FFFF) of bytes 2 to 13
 """
+
+import math
+from itertools import combinations, pairwise
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -69,12 +73,32 @@ LONGEST_SILENCE_US = 10_000_000
 SHORTEST_PERIOD_US = 50
 """No board sends more often: what looks like many lost packets in too short a time is another clock."""
 
+NEXT_US, JITTER_SHARE, PERIOD_SHARE = 1_000_000, 0.25, 0.01
+"""A packet counts at once that comes within this time of the last, by the board's clock, at the time that its number
+tells: within a share of a period, and of all the time since the last."""
+
+PERIOD_GAIN = 0.1
+"""Weight of a new period in the mean of the periods."""
+
+CONFIRMED_BY = 2
+"""Packets that must follow one another to the next before a packet counts that did not come next: two false ones in a
+row may, three never do."""
+
 MOST_DOUBTFUL = 8
-"""Packets in a row that follow neither the last one that counts nor each other: more than chance ever makes."""
+"""Packets in a row that neither come next nor follow each other: more than chance ever makes."""
 
 Indices = npt.NDArray[np.intp]
 Packets = npt.NDArray[np.void]
 """Packets as an array of `LAYOUT`."""
+
+
+class _Found(NamedTuple):
+    """A packet whose checksum is right."""
+
+    packet: Packets
+    """(1,)."""
+    at: int
+    """Its first byte, of all that were received."""
 
 
 class PacketParser:
@@ -85,50 +109,74 @@ class PacketParser:
         self._rest: Bytes = np.zeros(0, dtype=np.uint8)
         self._last: Packets | None = None
         """The newest packet that counts, shape (1,)."""
-        self._doubtful: list[Packets] = []
-        """Those after it that do not follow it, each (1,): the next packet tells."""
+        self._doubtful: list[_Found] = []
+        """Those after it that do not come next: the next ones must confirm them."""
+        self._period_us = math.nan
+        """Mean time from number to number, by the board's clock."""
         self._sequence, self._time_us = 0, 0
         """Number and time of the newest packet, unwrapped."""
-        self._received = 0
+        self._received = self._used = self._shared = 0
+        """Bytes so far; those up to the end of the newest packet that counts; those that belong to two of them."""
         self.counts = Counts()
 
     def feed(self, data: bytes) -> Samples:
         """The samples that became whole with these bytes."""
-        self._received += len(data)
         stream = np.concatenate((self._rest, np.frombuffer(data, dtype=np.uint8)))
-        starts = _whole_packets(stream)
-        packets = _packets_at(stream, starts)
-        last = self._last
-        if last is not None and not self._doubtful and _in_order(last, starts, packets):
+        self._received += len(data)
+        starts, last = _whole_packets(stream), self._last
+        packets, starts = _packets_at(stream, starts), starts + (self._received - len(stream))
+        if last is not None and self._in_order(last, starts, packets):
             anew = np.zeros(len(packets), dtype=np.int64)
-            used = int(starts[-1]) + SIZE if len(starts) else 0
         else:
-            packets, anew, used = self._choose(starts, packets)
+            packets, anew = self._choose(starts, packets)
         self._last = packets[-1:].copy() if len(packets) else last
         # What may still be the beginning of a packet waits for its end.
-        self._rest = stream[max(used, len(stream) - (SIZE - 1)) :].copy()
+        self._rest = stream[max(0, len(stream) - (SIZE - 1)) :].copy()
         return self._count_on(last, packets, anew)
 
-    def _choose(self, starts: Indices, packets: Packets) -> tuple[Packets, npt.NDArray[np.int64], int]:
-        """Choose the packets that count. Returns them, (n,); (n,), 1 where the firmware began anew with the packet,
-        else 0; and how many bytes are used up. Bytes of a doubtful packet are not used up: a packet that counts may
-        begin among them."""
-        chosen, anew, used, last = [packets[:0]], [0] * 0, 0, self._last
-        for k, start in enumerate(starts.tolist()):
-            packet = packets[k : k + 1]
-            if start < used:
+    def _in_order(self, last: Packets, starts: Indices, packets: Packets) -> bool:
+        """Whether there is nothing to choose."""
+        follows_bytes = np.diff(starts, prepend=self._used - SIZE) >= SIZE
+        if self._doubtful or not (follows_bytes & _comes_next(last, packets, self._period_us)).all():
+            return False
+        if len(packets):
+            steps, times = _steps(last, packets)
+            self._period_us += PERIOD_GAIN * (float(times.sum() / steps.sum()) - self._period_us)
+            self._used = int(starts[-1]) + SIZE
+        return True
+
+    def _choose(self, starts: Indices, packets: Packets) -> tuple[Packets, npt.NDArray[np.int64]]:
+        """Choose the packets that count. Returns them, (n,), and (n,), 1 where the firmware began anew with the packet,
+        else 0. One that comes next may share bytes with the one before: that may have lost its last ones, and the
+        first of the next were the same."""
+        chosen, anew, last = [packets[:0]], [0] * 0, self._last
+        for k, at in enumerate(starts.tolist()):
+            found = _Found(packets[k : k + 1].copy(), at)
+            comes_next = last is not None and _comes_next(last, found.packet, self._period_us).all()
+            if not comes_next and (at < self._used or _is_repeat(last, found.packet)):
                 continue
-            if last is not None and _follows(last, packet).all():
-                chosen.append(packet)
-                anew.append(0)
-            elif followed := [other for other in self._doubtful if _follows(other, packet).all()]:
-                chosen += [followed[-1], packet]
-                anew += [int(last is not None), 0]
-            else:
-                self._doubtful, used = [*self._doubtful[1 - MOST_DOUBTFUL :], packet.copy()], start + 1
+            counting = [found] if comes_next else self._chain_to(found, 1 if last is None else CONFIRMED_BY)
+            if not counting:
+                self._doubtful = [*self._doubtful[1 - MOST_DOUBTFUL :], found]
                 continue
-            last, self._doubtful, used = packet, [], start + SIZE
-        return np.concatenate(chosen), np.array(anew, dtype=np.int64), used
+            for each in counting:
+                anew.append(int(last is not None and not _follows(last, each.packet).all()))
+                chosen.append(each.packet)
+                last = each.packet
+                self._shared += max(0, self._used - each.at)
+                self._used = each.at + SIZE
+            self._doubtful = []
+        return np.concatenate(chosen), np.array(anew, dtype=np.int64)
+
+    def _chain_to(self, found: _Found, before: int) -> list[_Found]:
+        """So many doubtful packets, each followed by the next and the last by this one, and itself; or none."""
+        for before_it in combinations(self._doubtful[::-1], before):
+            chain = [*before_it[::-1], found]
+            if all(_follows(this.packet, other.packet).all() for this, other in pairwise(chain)):
+                steps, times = _steps(chain[-2].packet, found.packet)
+                self._period_us = float(times[0] / steps[0])
+                return chain
+        return []
 
     def _count_on(self, last: Packets | None, packets: Packets, anew: npt.NDArray[np.int64]) -> Samples:
         """last: the packet before these, (1,). Where the firmware began anew number and time go on by a step: what
@@ -148,10 +196,15 @@ class PacketParser:
         self.counts = Counts(
             packets=was.packets + len(packets),
             lost=was.lost + int((steps - 1).sum()),
-            spoiled_bytes=self._received - len(self._rest) - SIZE * (was.packets + len(packets)),
+            spoiled_bytes=max(was.spoiled_bytes, self._judged_bytes() - SIZE * (was.packets + len(packets))),
             restarts=was.restarts + int(anew.sum()),
         )
         return Samples(sequence, time_us, packets["raw"], was.restarts + np.cumsum(anew))
+
+    def _judged_bytes(self) -> int:
+        """Bytes that no later ones can make part of a packet."""
+        judged = max(self._used, self._received - len(self._rest))
+        return judged + self._shared - sum(min(SIZE, max(0, judged - doubtful.at)) for doubtful in self._doubtful)
 
 
 def _steps(last: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -167,9 +220,15 @@ def _follows(last: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
     return (steps > 0) & (steps < 2**15) & (times >= SHORTEST_PERIOD_US * steps) & (times < LONGEST_SILENCE_US)
 
 
-def _in_order(last: Packets, starts: Indices, packets: Packets) -> bool:
-    """Whether there is nothing to choose."""
-    return bool((np.diff(starts) >= SIZE).all() and _follows(last, packets).all())
+def _is_repeat(last: Packets | None, packet: Packets) -> bool:
+    return last is not None and packet.tobytes() == last.tobytes()
+
+
+def _comes_next(last: Packets, packets: Packets, period_us: float) -> npt.NDArray[np.bool_]:
+    """(n,): whether each packet comes soon after the one before, at the board's rate. False for a period of NaN."""
+    steps, times = _steps(last, packets)
+    at_rate = np.abs(times - period_us * steps) <= period_us * (JITTER_SHARE + PERIOD_SHARE * steps)
+    return at_rate & (times < NEXT_US) & _follows(last, packets)
 
 
 def _whole_packets(stream: Bytes) -> Indices:

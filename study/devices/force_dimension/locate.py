@@ -48,7 +48,7 @@ def _folders(computer: Computer) -> Iterator[Path]:
     if computer.system == "win32":
         for variable, vendor in WINDOWS_FOLDERS:
             if environ.get(variable):
-                roots += sorted((Path(environ[variable]) / vendor).glob("sdk-*"), reverse=True)
+                roots += sorted((Path(environ[variable]) / vendor).glob("sdk-*"), key=_version_in, reverse=True)
         yield from (root / "bin" for root in roots)
         return
     system, compiler = ("mac", "clang") if computer.system == "darwin" else ("lin", "gcc")
@@ -71,5 +71,5 @@ def _newest(folder: Path, pattern: str) -> Path | None:
 
 
 def _version_in(path: Path) -> tuple[int, ...]:
-    """Numbers in a file's name: libdrd.so.3.17.5 is newer than libdrd.so.3.9.0."""
+    """Numbers in a name: libdrd.so.3.17.5 is newer than libdrd.so.3.9.0, and sdk-3.17.5 than sdk-3.9.0."""
     return tuple(int(part) for part in path.name.replace("-", ".").split(".") if part.isdigit())

@@ -85,13 +85,13 @@ def check_on(calls: Addresses, cells: FloatArray) -> int:
     status = room_for_16()
     if call_int(calls[STATUS], (status, np.int32(cells[NUMBER]))) < 0:
         return record_library_failure(cells, STATUS)
-    cause = _number_at(status, OFF_CAUSE_PLACE)
-    if _number_at(status, FORCE_ON_PLACE) != 0:
+    cause, on = _number_at(status, OFF_CAUSE_PLACE), _number_at(status, FORCE_ON_PLACE) != 0
+    if on or cause == 0:
         if _number_at(status, POWERED_PLACE) == 0:
             cause = UNPOWERED_CAUSE
         elif _number_at(status, CALIBRATED_PLACE) == 0:
             cause = UNCALIBRATED_CAUSE
-        else:
+        elif on:
             return 0
     if cells[SENT_ZERO] != 0.0 and cause == WATCHDOG_CAUSE:
         return -1

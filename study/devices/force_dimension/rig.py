@@ -14,6 +14,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
+from study.devices.drive.real_time_class import real_time_class
 from study.devices.force_dimension import loop_cells, tick_io
 from study.devices.force_dimension.handle import Handle, why_off
 from study.devices.force_dimension.library import LibraryError
@@ -65,7 +66,8 @@ class ForceDimensionRig:
         self._cells[loop_cells.NUMBER] = handle.number
         self._cells[loop_cells.CAP_N] = min(cap_n, info.max_force_n)
         self._cells[loop_cells.DROPS_AFTER_S] = drops_force_after_s
-        self._cells[loop_cells.SENT_S], self._cells[loop_cells.SENT_ZERO] = time.monotonic(), 1.0
+        # How long ago the device got its last zero is not known: it is asked before the first force.
+        self._cells[loop_cells.SENT_S], self._cells[loop_cells.SENT_ZERO] = -math.inf, 1.0
         shared: FloatArray | None = getattr(accelerometer, "samples", None)
         self._samples: FloatArray = np.zeros((1, 1)) if shared is None else shared
         self._overlaid = accelerometer if shared is None else None
@@ -150,16 +152,14 @@ class ForceDimensionRig:
         return bool(self._cells[loop_cells.LET_GO])
 
     def _repeat_zero_force(self) -> None:
-        """Repeat a zero force. Never sends one between two forces, nor anything after a failure."""
-        every_s, zero, cells = REST_SHARE * self.drops_force_after_s, np.zeros(3), self._cells
-        while not self._closed.wait(every_s) and cells[loop_cells.FAILED] == 0.0:
-            with self._sending:
-                resting = cells[loop_cells.SENT_ZERO] and time.monotonic() - cells[loop_cells.SENT_S] >= every_s
-                if resting and not self._closed.is_set():
-                    code = tick_io.send_once(self._calls, cells, zero)
-                    if code:
-                        self._error(code)
-                        return
+        """Repeat a zero force. Never sends one between two forces, nor anything after a failure. As the loop, before
+        other programs: a program that goes before this thread while it sends would hold up the loop's next force."""
+        every_s, zero = REST_SHARE * self.drops_force_after_s, np.zeros(3)
+        with real_time_class():
+            while not self._closed.wait(every_s) and self._cells[loop_cells.FAILED] == 0.0:
+                code = tick_io.rest_once(self._calls, self._cells, every_s, zero)
+                if code:
+                    self._error(code)
 
     def _raise_for(self, code: int) -> None:
         if code:

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.newest_sample import CLIPPED, COUNT, FRESH_S, REST, ROWS, SENSED, TAKEN_S
-from study.devices.drive.compiled_drive import SENSE_SIGNATURE, WRITE_SIGNATURE
+from study.devices.drive.compiled_drive import CALLS, SENSE_SIGNATURE, WRITE_SIGNATURE
 from study.devices.force_dimension.handle import SCALED, STALE
 from study.devices.force_dimension.loop_cells import (
     BRAKES,
@@ -49,6 +49,7 @@ from study.devices.force_dimension.loop_cells import (
     record_library_failure,
 )
 from study.devices.governor.compiling import fingerprint, part
+from study.devices.governor.govern import VECTOR
 from study.devices.native import Addresses, acquire, call_int, now_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
 
@@ -65,6 +66,7 @@ A force whose peaks alone are scaled is so only for some milliseconds in a row, 
 
 ROUNDING = 1 + 1e-9
 """Factor on the cap that rounding may need."""
+REST_SIGNATURE = types.int64(CALLS, VECTOR, types.float64, VECTOR)
 LOCK_S = 0.002
 """Longest wait for the lock (s). A write lasts a tenth of it: a longer wait is for a call that hangs."""
 
@@ -146,10 +148,11 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
         if code != 0:
             return code
     x, y, z = force[0], force[1], force[2]
+    began_s = now_s(calls)  # the device counts from when it got the force, which may be long before the call ends
     answer = _set_force(calls, cells, x, y, z)
     if answer < 0:
         return record_library_failure(cells, FORCE)
-    cells[SENT_S] = now_s(calls)
+    cells[SENT_S] = began_s
     note_sent(cells, x, y)
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
     cells[TOO_STRONG] = count_beyond_share(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
@@ -160,6 +163,7 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 @part
 def _send_zero(calls: Addresses, cells: FloatArray) -> int:
+    began_s = now_s(calls)
     if _set_force(calls, cells, 0.0, 0.0, 0.0) < 0:
         return record_library_failure(cells, FORCE)
     if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
@@ -170,7 +174,7 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
     note_sent(cells, 0.0, 0.0)
     cells[SENT_ZERO], cells[TOO_STRONG] = 1.0, 0.0
     if not _is_silent(calls, cells):
-        cells[SENT_S] = now_s(calls)
+        cells[SENT_S] = began_s
     return 0
 
 
@@ -207,6 +211,20 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     return code
 
 
+@part
+def _rest(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
+    """Repeat a zero where nothing is played. The lock is never kept while the interpreter is waited for: the loop's
+    next force waits no longer than `LOCK_S` for it."""
+    if not acquire(calls, LOCK_S):
+        return 0
+    code = 0
+    resting = cells[SENT_ZERO] != 0.0 and now_s(calls) - cells[SENT_S] >= every_s
+    if resting and cells[CLOSED] == 0.0 and cells[FAILED] == 0.0:
+        code = _send_force(calls, cells, force)
+    release(calls)
+    return code
+
+
 def _entry_points(sources: int) -> tuple[Any, Any, Any]:
     @njit(SENSE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def sense_once(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
@@ -218,16 +236,16 @@ def _entry_points(sources: int) -> tuple[Any, Any, Any]:
         _ = sources
         return _write(calls, cells, force)
 
-    @njit(WRITE_SIGNATURE, cache=True, nogil=True, error_model="numpy")
-    def send_once(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
+    @njit(REST_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+    def rest_once(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
         _ = sources
-        return _send_force(calls, cells, force)
+        return _rest(calls, cells, every_s, force)
 
-    return sense_once, write_once, send_once
+    return sense_once, write_once, rest_once
 
 
 _DEVICES = Path(__file__).parents[1]
-sense_once, write_once, send_once = _entry_points(
+sense_once, write_once, rest_once = _entry_points(
     fingerprint(
         Path(__file__).parent,
         *(
@@ -236,4 +254,5 @@ sense_once, write_once, send_once = _entry_points(
         ),
     )
 )
-"""The first two as `study.devices.rig.CompiledIo` wants them; `send_once`: what `write_once` does with the lock."""
+"""The first two as `study.devices.rig.CompiledIo` wants them; `rest_once(calls, cells, every_s, zero)`: repeats the
+zero where the last force was one, so long ago."""

@@ -95,18 +95,24 @@ def wake_at_every_tick(clock: Clock, rate_hz: float, seconds: float, go_on: Call
 
 def _lateness_s(device: Device, clock: Clock, seconds: float, go_on: Callable[[float], bool]) -> FloatArray:
     """Lateness of the readings of a real device's own loop by its telemetry's time stamps, after the earliest of them;
-    where there is no such loop, of this program's wake-ups."""
+    where there is no such loop, of this program's wake-ups. A reading after missed ticks is as late as the first of
+    them was due before it."""
     rate_hz = device.info.sample_rate_hz
     if device.info.simulated or not device.telemetry:
         return np.array(wake_at_every_tick(clock, rate_hz, seconds, go_on))
-    reader, after_due_s = telemetry_of(device.telemetry), []
+    reader, after_due_s, missed = telemetry_of(device.telemetry), [], []
     started_s = clock.now_s()
     while go_on(done_s := clock.now_s() - started_s) and done_s < seconds:
         clock.sleep(SIGN_OF_LIFE_EVERY / rate_hz)
         ticks = reader.read()
         after_due_s.append(ticks.time_s - ticks.tick / rate_hz)
+        missed.append(ticks.missed)
     found = np.concatenate(after_due_s or [np.zeros(0)])
-    return found - found.min() if len(found) else np.array([seconds])  # it never turned
+    if not len(found):
+        return np.array([seconds])  # it never turned
+    so_far: FloatArray = np.concatenate(missed)
+    late_s: FloatArray = found - found.min() + np.diff(so_far, prepend=so_far[:1]) / rate_hz
+    return late_s
 
 
 def _attend(device: Device, on_progress: Callable[[float], None], done_s: float) -> bool:

@@ -39,7 +39,7 @@ NAMED_IN = {
     },
     "CompiledTicks": {"study/devices/drive/stepped_runner.py"},
     "write_once": {"study/devices/force_dimension/tick_io.py", "study/devices/force_dimension/rig.py"},
-    "send_once": {
+    "rest_once": {
         "study/devices/force_dimension/tick_io.py",
         "study/devices/force_dimension/rig.py",  # zero only
     },

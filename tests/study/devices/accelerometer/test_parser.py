@@ -182,6 +182,65 @@ def test_false_packets_among_a_million_garbled_bytes_count_for_nothing(seed):
     assert counts.spoiled_bytes == len(garbled) - SIZE * len(raw)
 
 
+def with_crc_ending_in(start: bytes, sequence: int) -> tuple[bytes, np.ndarray]:
+    """A packet whose check sum ends in these bytes, and its raw values."""
+    raw = np.random.default_rng(7).integers(0, 2**16, (2**18, 3), dtype=np.uint16)
+    tries = encode_packets(np.full(len(raw), sequence), np.full(len(raw), 250 * sequence), raw)
+    rows = np.frombuffer(tries, dtype=np.uint8).reshape(-1, SIZE)
+    found = np.flatnonzero((rows[:, -len(start) :] == np.frombuffer(start, dtype=np.uint8)).all(axis=1))[0]
+    return rows[found].tobytes(), raw[found]
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+def test_a_packet_that_lost_its_last_bytes_does_not_hide_the_next_that_begins_with_the_same(lost):
+    """Then both are whole, however the bytes come."""
+    data, raw = stream(4)
+    torn, torn_raw = with_crc_ending_in(SYNC[:lost], 2)
+    spoiled = data[: 2 * SIZE] + torn[:-lost] + data[3 * SIZE :]
+    for cut in range(len(spoiled)):
+        parser = PacketParser()
+        samples = parser.feed(spoiled[:cut]), parser.feed(spoiled[cut:])
+        assert np.concatenate([each.sequence for each in samples]).tolist() == [0, 1, 2, 3], cut
+        assert (np.concatenate([each.raw for each in samples]) == [*raw[:2], torn_raw, raw[3]]).all()
+        assert (parser.counts.packets, parser.counts.spoiled_bytes, parser.counts.lost) == (4, 0, 0)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_packets_that_come_again_or_lie_are_told_apart_among_garbled_ones(seed):
+    """Repeats, old ones sent again, ones from the near future and from anywhere, two in a row as well."""
+    random = np.random.default_rng(seed)
+    data, raw = stream(20_000, seed=seed)
+    pieces, good = [data[: 4 * SIZE]], [0, 1, 2, 3]
+    for k in range(4, len(raw)):
+        packet, fate = data[k * SIZE : (k + 1) * SIZE], random.random()
+        if fate < 0.8:
+            good.append(k)
+            pieces.append(packet * (1 + (fate < 0.05)))
+        elif fate < 0.82:
+            pieces.append(packet[: int(random.integers(SIZE - 2))])
+        elif fate < 0.825:
+            late = good[-int(random.integers(1, 50)) :][0]
+            pieces.append(encode_packets(late, 250 * late, raw[late][None]))
+        elif fate < 0.83:
+            pieces.append(encode_packets(k + int(random.integers(50)), 250 * k + 25_000, [[1, 2, 3]]))
+        elif fate < 0.835:
+            pieces.append(encode_packets(int(random.integers(2**16)), int(random.integers(2**32)), [[1, 2, 3]]))
+        else:
+            pieces.append(random.integers(0, 256, int(random.integers(0, 200)), dtype=np.uint8).tobytes())
+    pieces.append(data[-SIZE:])
+    good = sorted({*good, len(raw) - 1})
+    garbled, parser, found, at = b"".join(pieces), PacketParser(), [], 0
+    while at < len(garbled):
+        size = int(random.choice([1, 15, 16, 17, 64, 4096]))
+        found.append(parser.feed(garbled[at : at + size]))
+        at += size
+    assert np.concatenate([samples.sequence for samples in found]).tolist() == good
+    assert (np.concatenate([samples.raw for samples in found]) == raw[good]).all()
+    counts = parser.counts
+    assert (counts.packets, counts.lost, counts.restarts) == (len(good), len(raw) - len(good), 0)
+    assert 0 <= len(garbled) - SIZE * len(good) - counts.spoiled_bytes < SIZE
+
+
 def test_the_firmware_makes_the_same_packets(vendor, tmp_path):
     source = tmp_path / "firmware.c"
     source.write_text(

@@ -126,14 +126,24 @@ def test_a_position_that_is_reported_as_read_and_never_written_is_no_position(st
     assert fault is Fault.NOT_A_NUMBER
 
 
+NO_CAUSE = 0.5
+"""Of the stub's `off_by`: the force goes off, and the status has no cause for it."""
+
+
+@pytest.mark.parametrize("off_by", [0, NO_CAUSE], ids=["says force on", "off without a cause"])
 @pytest.mark.parametrize(
     ("switch", "why"),
     [("powered", "its power supply is off"), ("calibrated", "it does not know its place any more")],
 )
 def test_a_device_without_power_or_calibration_ends_the_force_although_it_says_force_on(
-    stepped_stub, rigs, switch, why
+    stepped_stub, rigs, switch, why, off_by
 ):
-    fault, said = lost_words(stepped_stub, rigs, lambda stub: stub.set(switch, 0))
+    def disturb(stub) -> None:
+        stub.set("off_by", off_by)
+        stub.advance(0.001)  # it is off before it is looked at
+        stub.set(switch, 0)
+
+    fault, said = lost_words(stepped_stub, rigs, disturb)
     assert fault is Fault.LOST
     assert why in said
 

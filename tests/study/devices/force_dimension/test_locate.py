@@ -39,6 +39,7 @@ def test_the_library_is_found_in_the_home_folder_and_below_program_files(tmp_pat
     assert find_library(computer(tmp_path)) == path
     laid(tmp_path / "programs" / "Force Dimension" / "sdk-3.16.1" / "bin" / "drd64.dll")
     newer = laid(tmp_path / "programs" / "Force Dimension" / "sdk-3.17.5" / "bin" / "drd64.dll")
+    laid(tmp_path / "programs" / "Force Dimension" / "sdk-3.9.0" / "bin" / "drd64.dll")  # its name sorts last
     assert find_library(computer(tmp_path, "win32", ProgramFiles=str(tmp_path / "programs"))) == newer
 
 

@@ -1,6 +1,7 @@
 """Timing with zero force: what a loop that keeps up looks like, and one that does not."""
 
 import contextlib
+import itertools
 import threading
 import time
 from dataclasses import replace
@@ -158,6 +159,18 @@ def test_the_lateness_of_a_real_device_is_that_of_its_own_loop(rigs, settings):
     assert timing.lateness.too_late and timing.lateness.missing_a_tick > 0.1
     assert timing.lateness.longest_ms > 2.5
     assert 1000 * timing.health.latest_s > timing.lateness.longest_ms - 1.0
+
+
+@pytest.mark.real_time
+def test_a_reading_after_missed_ticks_is_as_late_as_the_first_of_them_says(rigs, settings):
+    """Every fiftieth force takes 12 ms: lateness and late ticks tell the same."""
+    rig, writes = rigs.HeldForceRig(), itertools.count()
+    rig.before_writing = lambda force_n: time.sleep(0.012 if next(writes) % 50 == 49 else 0.0)
+    with contextlib.closing(SafeDevice(rig, settings, RealClock(), Ring())) as device:
+        timing = check_timing(device, RealClock(), 0.5, lambda done: None)
+    assert timing.health.missed_ticks > 20
+    assert timing.lateness.longest_ms > 10.5
+    assert timing.lateness.missing_a_tick > 0.01
 
 
 @pytest.mark.parametrize(("load", "fine"), [(1.3, True), (0.3, False), (None, False)])

@@ -12,11 +12,16 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.lqr.changing_direction import play
+from equalizer.tracking.realtime.controller_cases import AFTER, controller_cases
 from equalizer.tracking.realtime.realtime_controller import RealtimeSettings
 from study.cli.main import main
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.trajectory_file import write_trajectory
-from study.workflows.equalizer.controller.export_controller import ControllerPlan, export_controller
+from study.workflows.equalizer.controller.export_controller import (
+    LONGEST_PREVIEW_S,
+    ControllerPlan,
+    export_controller,
+)
 from tests.study.workflows.equalizer.controller.build import CHANNELS, build, compiled_cpp, run, write_model
 
 
@@ -31,6 +36,19 @@ def test_it_compiles_without_a_warning_and_agrees_with_python(vendor, tmp_path, 
     transient, stream = map(float, re.findall(r"(?:transient|stream) (\S+) N", done.stdout.splitlines()[0]))
     assert 0 < transient < 3e-12 and 0 < stream < 3e-12
     assert re.search(r"a tick: transient \d+ ns, stream \d+ ns", done.stdout)
+
+
+def test_the_longest_preview_that_is_accepted_is_compared_too(vendor, tmp_path):
+    """The first sample of a stream is played after it."""
+    settings = RealtimeSettings(preview_s=LONGEST_PREVIEW_S)
+    out = tmp_path / "out"
+    exported = export_controller(ControllerPlan(write_model(tmp_path / "model.h5"), out, settings=settings))
+    late = len(exported.controller.tracker) - 1
+    assert late == 1999
+    done = run(build(vendor, out, "check_controller.c"))
+    assert done.returncode == 0, done.stdout
+    forces = controller_cases(exported.controller).stream_forces
+    assert np.count_nonzero(np.abs(forces[late:]).max(axis=1) > 0.01) >= AFTER
 
 
 def test_the_measured_tick_of_the_page_is_below_a_microsecond():
@@ -185,10 +203,12 @@ def test_numbers_are_written_to_their_last_bit(exported):
         ("no weight", "no stationary gains"),
         ("silent", "The transient comes to no force"),
         ("strong", "the strongest device gives 20 N"),
+        ("no states", "has no states"),
     ],
 )
 def test_what_cannot_be_exported_is_reported_and_nothing_is_written(tmp_path, capsys, change, says):
-    model = write_model(tmp_path / "model.h5", size=2 if change == "two axes" else 3)
+    order = 0 if change == "no states" else 8
+    model = write_model(tmp_path / "model.h5", order=order, size=2 if change == "two axes" else 3)
     out, words = tmp_path / "out", []
     if change == "there already":
         out.mkdir()

@@ -1,0 +1,88 @@
+"""Zeros while nothing is played: in a thread of its own, which delays no force of the loop, and counted as the device
+counts them."""
+
+import contextlib
+import ctypes
+import threading
+import time
+
+import numpy as np
+import pytest
+from numba import njit
+
+from study.devices.native import acquire, now_s, release, sleep_until
+
+pytestmark = pytest.mark.real_time
+
+EVERY_S, FOR_S = 0.0002, 1.0
+KEPT_S = 0.05
+"""For so long the interpreter is kept at a time, as by a program that prepares a stimulus."""
+
+
+@njit(nogil=True)
+def longest_wait_s(calls, every_s, for_s):
+    """For the lock of the writes, asked for again and again without the interpreter, as the loop does."""
+    longest, until = 0.0, now_s(calls) + for_s
+    while now_s(calls) < until:
+        asked = now_s(calls)
+        if acquire(calls, for_s):
+            longest = max(longest, now_s(calls) - asked)
+            release(calls)
+        sleep_until(calls, now_s(calls) + every_s)
+    return longest
+
+
+def test_the_repeated_zero_keeps_the_lock_for_no_wait_for_the_interpreter(stub):
+    stub.set("stretch_in_use", 1000)
+    stub.set("watchdog_stretch", 1000)
+    keep, over = ctypes.PyDLL(None).usleep, threading.Event()
+    with contextlib.closing(stub.rig(rests=True)) as rig:
+        calls = rig.halves.calls
+        longest_wait_s(calls, EVERY_S, 0.01)  # compiled
+        sent = stub.get("writes")
+
+        def keep_the_interpreter() -> None:
+            while not over.is_set():
+                keep(round(1e6 * KEPT_S))
+
+        keeper = threading.Thread(target=keep_the_interpreter)
+        keeper.start()
+        try:
+            longest_s = longest_wait_s(calls, EVERY_S, FOR_S)
+        finally:
+            over.set()
+            keeper.join()
+        assert stub.get("writes") > sent  # zeros were sent meanwhile
+        assert longest_s < KEPT_S / 2
+
+
+@pytest.mark.parametrize("late_s", [0.02, 0.028])
+def test_a_device_that_let_go_while_a_zero_was_sent_late_is_woken_for_the_next_force(stub, late_s):
+    """Its watchdog counts from when the zero came, not from when the call ended: at the force it has let go."""
+    stub.set("stretch_in_use", 100)  # from the first force on: the computer of the tests may be busy
+    with contextlib.closing(stub.rig()) as rig:
+        stub.set("write_late_s", late_s)
+        stub.set("write_late_every", 1)
+        rig.write(np.zeros(3))
+        stub.set("write_late_every", 0)
+        time.sleep(rig.drops_force_after_s - late_s + 0.005)
+        assert not stub.get("force_on")
+        rig.write(np.array([0.5, 0.0, 0.0]))
+        assert stub.get("force_on") and stub.applied_n.any()
+
+
+def test_a_device_that_let_go_while_it_was_opened_is_woken_for_the_first_force(stub, vendor, monkeypatch):
+    """A busy computer may come back to the opening after the watchdog's time."""
+    stub.set("stretch_in_use", 100)
+    make_ready = vendor.make_ready
+
+    def make_ready_and_stand_still(*arguments) -> float:
+        drops_after_s: float = make_ready(*arguments)
+        time.sleep(drops_after_s + 0.02)
+        return drops_after_s
+
+    monkeypatch.setattr(vendor, "make_ready", make_ready_and_stand_still)
+    with contextlib.closing(stub.rig()) as rig:
+        assert not stub.get("force_on")
+        rig.write(np.array([0.5, 0.0, 0.0]))
+        assert stub.get("force_on") and stub.applied_n.any()
