@@ -29,7 +29,7 @@ from study.workflows.run_on_executor import finished_pieces
 
 CHUNK = 10
 """Studies per piece of work: some seconds, so that little is lost when a worker dies."""
-HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery")
+HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery", "rove_db")
 """Fields of `Crowd` that were added later; at their defaults, a folder that was begun earlier can be continued."""
 FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
 
