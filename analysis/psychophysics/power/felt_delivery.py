@@ -38,8 +38,8 @@ def felt_delivery(
     trials: Iterable[Trial], frequencies_hz: Sequence[float], flawless_mps2_per_n: Sequence[float]
 ) -> FeltDelivery:
     """Medians over the measured test trials, by played levels rounded to 1 dB. flawless_mps2_per_n: along the
-    direction, at each frequency. What no trial of a level was measured for counts as absent. Raises ValueError where a frequency
-    lacks a measured direction."""
+    direction, at each frequency. What no trial of a level was measured for counts as absent. Raises ValueError where a
+    frequency lacks a measured direction."""
     groups = {group.frequency_hz: group for group in delivered_trials(trials)}
     if missing := [f"{f:g} Hz" for f in frequencies_hz if f not in groups or len(set(groups[f].side.tolist())) < 2]:
         raise ValueError(f"no measured trials of both directions at {', '.join(missing)}")
