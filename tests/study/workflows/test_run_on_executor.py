@@ -1,7 +1,9 @@
 """Pieces of work on an executor: what finished is handed over before an error ends the whole."""
 
+import os
 import platform
 import resource
+import signal
 import subprocess
 import sys
 from concurrent.futures import Executor, Future
@@ -9,6 +11,7 @@ from concurrent.futures import Executor, Future
 import numpy as np
 import pytest
 
+from study.errors import StudyError
 from study.workflows.run_on_executor import finished_pieces
 from study.workflows.worker_processes import worker_processes
 
@@ -54,3 +57,19 @@ def test_a_worker_keeps_the_memory_that_its_fits_free_and_ask_for_again():
 def test_workers_of_power_do_not_load_what_draws():
     asked = "import sys; import study.workflows.planning.simulate_power; print('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout == "False\n"
+
+
+def killed(number):
+    """As by the system for want of memory."""
+    os.kill(os.getpid(), signal.SIGKILL if number == 3 else 0)
+    return number
+
+
+@pytest.mark.timeout(120)
+def test_a_killed_worker_is_an_error_that_says_what_is_kept_and_what_to_do():
+    came = []
+    told = pytest.raises(StudyError, match=r"worker process was killed.*finished is kept.*goes on where it stopped")
+    with told, worker_processes(1) as pool:
+        for key, _ in finished_pieces(pool, killed, ((number, (number,)) for number in range(6))):
+            came.append(key)
+    assert came == [0, 1, 2]
