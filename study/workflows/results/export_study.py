@@ -1,6 +1,6 @@
 """Export a study's trials for other tools, with protocol, seeds and versions; read such a dataset back."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -21,6 +21,8 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.written_elsewhere import note_written
 from study.workflows.results.collected import CollectedTrials
 
+MOST_LEFT_OUT = 10_000
+"""A larger number in an edited file is no number of sessions."""
 Form = Literal["psych-ds", "bids", "mat", "csv"]
 WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
     "psych-ds": write_psych_ds,
@@ -65,7 +67,24 @@ def _facts(collected: CollectedTrials) -> dict[str, Any]:
         "devices": list(collected.devices),
         "observers": list(collected.observers),
         "locked": collected.locked,
+        # A number: its sentences name sessions of people who withdrew.
+        "left_out_count": len(collected.left_out),
+        "model_qualities": [list(each) for each in collected.qualities],
     }
+
+
+def _left_out(facts: Mapping[str, Any]) -> tuple[str, ...]:
+    """One sentence for each that was left out before the export; none where an older export does not say."""
+    count = facts.get("left_out_count", 0)
+    if not isinstance(count, int) or not 0 <= count <= MOST_LEFT_OUT:
+        return ()
+    return tuple(f"Before the export, {number} of {count} was left out." for number in range(1, count + 1))
+
+
+def _qualities(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    found = facts.get("model_qualities", [])
+    rows = found if isinstance(found, list) else []
+    return tuple((str(row[0]), str(row[1])) for row in rows if isinstance(row, list) and len(row) == 2)
 
 
 def is_exported(folder: Path) -> bool:
@@ -95,8 +114,8 @@ def collect_exported(folder: Path) -> CollectedTrials:
         seeds=tuple(int(seeds.get(name, 0)) for name in sessions),
         devices=tuple(map(str, found.facts.get("devices", ()))),
         observers=tuple(map(str, found.facts.get("observers", ()))),
-        left_out=(),
-        qualities=(),
+        left_out=_left_out(found.facts),
+        qualities=_qualities(found.facts),
         locked=str(found.facts.get("locked", "not known")),
         finished=(),
         parents=(*found.files, path),

@@ -3,6 +3,8 @@
 import csv
 import json
 import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,8 @@ from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 from study.store.formats.trials_file import read_trials
 from study.store.formats.trials_mat import write_trials_mat
+from study.workflows.results.collect_sessions import collect_sessions
+from study.workflows.results.export_study import collect_exported, export_study
 
 PSYCH_DS_FILE = re.compile(r"[a-z]+-[A-Za-z0-9]+(_[a-z]+-[A-Za-z0-9]+)*_data\.csv")
 
@@ -67,6 +71,39 @@ def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, cap
         del document["provenance"]
     assert first == second
     assert (tmp_path / "a" / "thresholds.csv").read_bytes() == (tmp_path / "b" / "thresholds.csv").read_bytes()
+
+
+@pytest.mark.usefixtures("sketched")
+@pytest.mark.parametrize("form", ["psych-ds", "csv"])
+def test_what_was_left_out_before_an_export_is_counted_after_it_without_a_name(data, tmp_path, capsys, form):
+    mine = tmp_path / "data"
+    shutil.copytree(data, mine)
+    assert main(["study", "--protocol", str(data.parent / "small.toml"), "--observer", "ideal", "--seed", "3",
+                 "--subject", "P77", "--data", str(mine)]) == 0  # fmt: skip
+    assert main(["withdraw", "P77_001", "--data", str(mine), "--yes"]) == 0
+    assert main(["export", str(mine), "--out", str(tmp_path / "ds"), "--format", form]) == 0
+    assert not any("P77" in path.read_text("utf-8") for path in (tmp_path / "ds").rglob("*.*") if path.is_file())
+    capsys.readouterr()
+    for source, out in ((mine, tmp_path / "a"), (tmp_path / "ds", tmp_path / "b")):
+        assert main(["analyze", str(source), "--out", str(out)]) == 0
+    assert "Note: Before the export, 1 of 1 was left out." in capsys.readouterr().err
+    first, second = (json.loads((tmp_path / name / "anova.json").read_text("utf-8")) for name in "ab")
+    assert first["declared_result"]["left_out_count"] == 1
+    assert first["declared_result"] == second["declared_result"]
+
+
+@pytest.mark.parametrize("count", ['"many"', "-1", "1e9", "10001"])
+def test_a_count_that_is_none_is_not_believed(data, tmp_path, count):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", "csv"]) == 0
+    facts = tmp_path / "ds" / "facts.json"
+    facts.write_text(facts.read_text("utf-8").replace('"left_out_count": 0', f'"left_out_count": {count}'), "utf-8")
+    assert collect_exported(tmp_path / "ds").left_out == ()
+
+
+def test_the_quality_of_models_comes_back_from_an_export(data, tmp_path):
+    collected = replace(collect_sessions(data), qualities=(("P01_001 and P02_001", "It predicts 90 %."),))
+    export_study(collected, data, tmp_path / "ds", "psych-ds")
+    assert collect_exported(tmp_path / "ds").qualities == collected.qualities
 
 
 def test_one_table_has_every_trial_and_a_dictionary_of_its_columns(data, tmp_path):
