@@ -21,6 +21,7 @@ from study.store.formats.trials_mat import write_trials_mat
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.export_study import collect_exported, export_study
 
+FLOAT = re.compile(r"\d+\.\d+")
 PSYCH_DS_FILE = re.compile(r"[a-z]+-[A-Za-z0-9]+(_[a-z]+-[A-Za-z0-9]+)*_data\.csv")
 
 
@@ -186,3 +187,26 @@ def test_a_table_with_a_wrong_row_is_named(data, tmp_path, capsys):
     path.write_text("\n".join([header, ",".join(fields), *rest]) + "\n")
     assert main(["analyze", str(tmp_path / "ds")]) != 0
     assert path.name in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", ["psych-ds", "csv"])
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda lines: [*lines[:2], lines[1], *lines[2:]], "is there 2 times"),
+        (lambda lines: [lines[0], FLOAT.sub("inf", lines[1], 1)], "is not finite"),
+        (lambda lines: [lines[0], FLOAT.sub("nan", lines[1], 1)], "is not finite"),
+        (lambda lines: lines[:1], "There is nothing to analyse"),
+    ],
+)
+def test_rows_twice_numbers_that_are_none_and_no_rows_are_refused(data, tmp_path, capsys, form, spoil, said):
+    """In any phase: what is no run of a staircase is not replayed, and would not contradict the protocol."""
+    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", form]) == 0
+    for path in (tmp_path / "ds").rglob("*.csv"):
+        lines = path.read_text("utf-8").splitlines()
+        if "level_n" in lines[0].split(",") and "session" in lines[0].split(","):
+            path.write_text("\n".join(spoil(lines)) + "\n", "utf-8")
+    capsys.readouterr()
+    assert main(["analyze", str(tmp_path / "ds"), "--out", str(tmp_path / "out")]) == 1
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
