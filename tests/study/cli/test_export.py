@@ -210,3 +210,10 @@ def test_rows_twice_numbers_that_are_none_and_no_rows_are_refused(data, tmp_path
     assert main(["analyze", str(tmp_path / "ds"), "--out", str(tmp_path / "out")]) == 1
     assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("form", ["bids", "mat"])
+def test_a_form_that_is_not_read_back_is_refused_with_those_that_are(data, tmp_path, capsys, form):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", form]) == 0
+    assert main(["analyze", str(tmp_path / "ds"), "--out", str(tmp_path / "out")]) == 2
+    assert "its export as psych-ds or csv (bids and mat" in " ".join(capsys.readouterr().err.split())
