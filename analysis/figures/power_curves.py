@@ -8,7 +8,7 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes
+from analysis.figures.style import BLUE, GREY, ORANGE, PAGE_IN, VERMILLION, new_figure, plain_axes
 from analysis.psychophysics.power.power_curve import CONFIDENCE, PowerPoint, Share
 from analysis.threshold_words import REVERSALS
 from equalizer.signals.signal import FloatArray
@@ -27,12 +27,14 @@ def power_picture(
     """points: one sample size each, at least one. effect_db: true difference, 0 for none, of the first frequency of
     pair_hz from the second. means: what thresholds of runs are, in the plural."""
     found = "finds the difference" if effect_db else "finds a difference that is not there (type-1 error)"
+    aim = "the power that is usually asked for" if effect_db else "the level of the test"
     return Picture(
         name="power",
         title=f"Of {points[0].studies} simulated studies of each size, with a difference of {effect_db:g} dB "
         f"between {pair_hz[0]:g} and {pair_hz[1]:g} Hz",
         caption=f"Above: share of the studies in which each analysis {found}. Below: share in which the primary "
-        f"analysis's {100 * CONFIDENCE:g} % interval holds the true difference. Bars: 95 % intervals of the shares.",
+        f"analysis's {100 * CONFIDENCE:g} % interval holds the true difference. Bars: 95 % intervals of the shares. "
+        f"Grey lines: {_line_percent(effect_db):g} %, {aim}, and {100 * CONFIDENCE:g} %.",
         figure=_draw(points, effect_db, means),
         alternative="; ".join(
             f"{point.people} participants: found in {100 * point.primary.value:.0f} % by all answers in one model, in "
@@ -42,8 +44,12 @@ def power_picture(
     )
 
 
+def _line_percent(effect_db: float) -> float:
+    return _DESIRED_POWER if effect_db else 100 * (1 - CONFIDENCE)
+
+
 def _draw(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
-    figure = new_figure(6.6, 5.6)
+    figure = new_figure(PAGE_IN, 5.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     curves = (
         ("all answers in one model", BLUE, "o-", [point.primary for point in points]),
@@ -55,7 +61,7 @@ def _draw(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
         drawn = _draw_shares(above, people + _MARKER_STEP * (place - 1), shares, colour, style)
         drawn.set_label(label)
     _draw_shares(below, people, [point.coverage for point in points], BLUE, "o-")
-    above.axhline(_DESIRED_POWER if effect_db else 100 * (1 - CONFIDENCE), color=GREY, linewidth=0.9)
+    above.axhline(_line_percent(effect_db), color=GREY, linewidth=0.9)
     below.axhline(100 * CONFIDENCE, color=GREY, linewidth=0.9)
     above.set_ylim(0, 103 if effect_db else None)
     above.set_ylabel("Found (% of studies)", fontsize=9)

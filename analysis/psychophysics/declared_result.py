@@ -55,6 +55,8 @@ class DeclaredResult:
     """As declared."""
     left_out: tuple[str, ...]
     """What did not enter, and why, in sentences."""
+    interval: Literal["undeclared", "paired_t", "tukey"] = "undeclared"
+    """As declared by name; undeclared: the one that goes with `primary`."""
 
 
 def declared_result(
@@ -90,6 +92,7 @@ def declared_result(
         participants_analysed=len(table.subjects),
         exclusions=declared.exclusions,
         left_out=tuple(left_out),
+        interval=declared.interval,
     )
 
 

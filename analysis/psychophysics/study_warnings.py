@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from scipy.stats import binom
 
+from analysis.psychophysics.bias import criterion_drift
 from analysis.psychophysics.catch_trials import CatchTally, wilson_interval
 from analysis.psychophysics.detection import directions_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
@@ -19,7 +20,9 @@ FEW_PARTICIPANTS = 5
 STRONG_BIAS = 0.6
 """Criterion beyond which response bias costs a staircase four in a hundred right answers. An observer
 without bias exceeds it by chance in about one of 250 runs."""
-
+DRIFT_LEVEL, LEFT_OUT_LEVEL = 0.02, 0.2
+"""Levels of the test of a drifting criterion, by session: of all runs, and of those without any one of them. Together
+they named 5 of 600 honest simulated sessions, and 112 of 240 whose criterion moved by 0.3 in 100 trials."""
 MANY_LAPSES = 0.1
 """Lapse rate on catch trials that is worth a look; the published staircase is meant for attentive people."""
 FELT_BY_ALL_HZ = 15.0
@@ -44,6 +47,7 @@ def study_warnings(
         _unequal_sizes_warning(table),
         _chance_warning(rows),
         _bias_warning(rows),
+        _drift_warning(trials),
         _spoiled_warning(trials),
         _flagged_warning(trials),
         _unmeasured_warning(trials),
@@ -172,6 +176,27 @@ def _bias_warning(rows: Sequence[Threshold]) -> str:
     if not leaning:
         return ""
     return f"A bias towards one of the two answers, which raises a threshold, shows in {conjoin(leaning)}."
+
+
+def _drift_warning(trials: Iterable[Trial]) -> str:
+    sessions: dict[tuple[str, str], dict[int, list[Trial]]] = {}
+    for trial in trials:
+        if trial.counts:
+            sessions.setdefault((trial.subject, trial.session), {}).setdefault(trial.run, []).append(trial)
+    drifting = []
+    for (subject, session), runs in sessions.items():
+        ordered = [runs[run] for run in sorted(runs)]
+        drift = criterion_drift(
+            [([row.direction_shown for row in run], [bool(row.correct) for row in run]) for run in ordered]
+        )
+        if drift is not None and drift.p < DRIFT_LEVEL and drift.p_without_a_run < LEFT_OUT_LEVEL:
+            drifting.append(f"{subject} ({session}, criterion {signed_number(drift.per_100_trials)} per 100 trials)")
+    if not drifting:
+        return ""
+    return (
+        f"A bias towards one of the two answers changed from run to run of a session (p < {DRIFT_LEVEL:g} each), which "
+        f"raises thresholds where it was strong: {conjoin(drifting)}."
+    )
 
 
 def _spoiled_warning(trials: Iterable[Trial]) -> str:

@@ -28,10 +28,9 @@ NEAR_CAP = (
 
 _NAMED = {"hierarchical": "the hierarchical model of all answers", "published": "the published one-way analysis"}
 _INTERVALS = {
-    "hierarchical": "Its interval of the contrast: 95 %, over people's pseudo-thresholds in dB, paired, t with n − 1 "
+    "hierarchical": "95 %, over people's pseudo-thresholds in dB, paired, t with n − 1 "
     "degrees of freedom; a single test, so uncorrected.",
-    "published": "Its interval of the contrast: 95 %, Tukey's of means of runs in newtons, which holds for all pairs "
-    "together.",
+    "published": "95 %, Tukey's of means of runs in newtons, which holds for all pairs together.",
 }
 
 
@@ -45,7 +44,11 @@ def declaration_text(declared: AnalysisSettings) -> str:
             "fewest excuses near the cap; a choice made after the data is no declaration."
         )
     else:
-        primary = f"Declared as primary in the protocol: {_NAMED[declared.primary]}. {_INTERVALS[declared.primary]}"
+        named = "Its interval" if declared.interval == "undeclared" else f"Declared interval ({declared.interval})"
+        primary = (
+            f"Declared as primary in the protocol: {_NAMED[declared.primary]}. "
+            f"{named} of the contrast: {_INTERVALS[declared.primary]}"
+        )
     first, second = declared.contrast_hz or (0.0, 0.0)
     parts = [
         f"Primary contrast: {first:g} Hz minus {second:g} Hz." if declared.contrast_hz else "",
@@ -54,6 +57,8 @@ def declaration_text(declared: AnalysisSettings) -> str:
     ]
     names = ("primary contrast", "sample size", "exclusions")
     missing = [name for name, part in zip(names, parts, strict=True) if not part]
+    if declared.primary == "undeclared":
+        missing.insert(0, "interval method")
     return " ".join(filter(None, [primary, *parts, f"Not declared: {conjoin(missing)}." if missing else ""]))
 
 

@@ -35,3 +35,16 @@ class AnalysisSettings:
         tuple[str, ...],
         Field(max_length=20, description="Whose data are left out, and why, in sentences. Default: none declared."),
     ] = ()
+    interval: Annotated[
+        Literal["undeclared", "paired_t", "tukey"],
+        Field(
+            description="How the 95 % interval of the primary contrast is computed, declared by name. 'paired_t': over "
+            "people's differences in dB (t), which goes with 'hierarchical'; 'tukey': Tukey's of means of runs in "
+            "newtons, which goes with 'published'. Default: undeclared; the interval is then the one that goes with "
+            "primary."
+        ),
+    ] = "undeclared"
+
+
+INTERVALS = {"hierarchical": "paired_t", "published": "tukey"}
+"""The interval that each primary analysis computes."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from protocols.definition.declared_analysis import INTERVALS
 from protocols.definition.probes import probe_contradictions
 from protocols.definition.problem import Problem
 
@@ -18,7 +19,13 @@ ROUNDING_N = 1e-9
 
 def contradictions(protocol: StudyProtocol) -> list[Problem]:
     """All contradictions between tables of the protocol; empty if it is consistent."""
-    return [*_levels(protocol), *_times(protocol), *_names(protocol), *probe_contradictions(protocol)]
+    return [
+        *_levels(protocol),
+        *_times(protocol),
+        *_names(protocol),
+        *_declared(protocol),
+        *probe_contradictions(protocol),
+    ]
 
 
 def _levels(protocol: StudyProtocol) -> list[Problem]:
@@ -93,8 +100,18 @@ def _names(protocol: StudyProtocol) -> list[Problem]:
     for name, questions in (("before", protocol.before), ("debrief", protocol.debrief)):
         if len({question.key for question in questions}) < len(questions):
             problems.append(Problem(name, "uses a key twice", "a key of its own for every question"))
-    contrast, played = protocol.analysis.contrast_hz, protocol.stimulus.frequencies_hz
+    return problems
+
+
+def _declared(protocol: StudyProtocol) -> list[Problem]:
+    problems, declared = [], protocol.analysis
+    contrast, played = declared.contrast_hz, protocol.stimulus.frequencies_hz
     if contrast and (len(set(contrast)) != 2 or not set(contrast) <= set(played)):
         allowed = "two different ones of stimulus.frequencies_hz, or none"
         problems.append(Problem("analysis.contrast_hz", f"is {list(contrast)}", allowed))
+    fitting = INTERVALS.get(declared.primary)
+    if declared.interval not in ("undeclared", fitting):
+        wrong = f"is {declared.interval}, while primary is {declared.primary}"
+        allowed = f"{fitting}, or undeclared" if fitting else "undeclared, or declare primary, too"
+        problems.append(Problem("analysis.interval", wrong, allowed))
     return problems

@@ -61,6 +61,8 @@ QUESTIONS_SINCE: dict[str, Untouched] = {
     "debrief.scale": [],
     "debrief.ends": [],
 }
+DECLARED_SINCE: dict[str, Untouched] = {"analysis.interval": "undeclared"}
+
 PLACEMENT_SINCE: dict[str, Untouched] = {"staircase.bayesian": {"trials": 0, "spread_db": 0.0}}
 
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
@@ -74,6 +76,7 @@ FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
         **SETUP_SINCE,
         **QUESTIONS_SINCE,
         **PLACEMENT_SINCE,
+        **DECLARED_SINCE,
     },
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
 }

@@ -87,7 +87,7 @@ def power(
 
     chosen = read_study_protocol(protocol, Path()).protocol
     crowd = _with_habits(_crowd(chosen, threshold_n, effect_db), people, curve, lapse, chosen.trial.repeats_per_run)
-    crowd = replace(crowd, delivery=_delivery(delivered, crowd.frequencies_hz))
+    crowd = replace(crowd, delivery=_delivery(delivered, crowd.frequencies_hz), rove_db=chosen.stimulus.rove_db)
     if compare:
         _compare(crowd, chosen.staircase, studies, seed, as_json)
         return
@@ -118,6 +118,10 @@ def _compare(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_j
         )
         typer.echo(f"{row.rule:42}{numbers}")
     typer.echo(f"{people} people, the same under every rule; errors of single runs in dB, root mean square.")
+    if crowd.rove_db:
+        typer.echo(f"Roved by {crowd.rove_db:g} dB, as the protocol says; Psi plays its levels as they are.")
+    if crowd.guessers or crowd.criterion_drift_sd or crowd.unsure or crowd.delivery is not None:
+        typer.echo("Of --people and --delivered nothing is in this comparison: people are attentive and feel commands.")
 
 
 def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":
@@ -146,7 +150,8 @@ def _table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str]:
         "the declared contrast" if plan.contrast_hz else "the highest frequency and the lowest; no contrast is declared"
     )
     compared = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {which}."
-    return [*power_lines(points, threshold_words(plan.rule).means), "", compared]
+    roved = [f"Levels roved by {plan.crowd.rove_db:g} dB, as the protocol says."] if plan.crowd.rove_db else []
+    return [*power_lines(points, threshold_words(plan.rule).means), "", compared, *roved]
 
 
 def _delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":

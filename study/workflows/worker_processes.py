@@ -3,17 +3,27 @@
 import signal
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
+
+from study.errors import StudyError
 
 
 @contextmanager
 def worker_processes(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """A process pool that ignores Ctrl-C in its workers. Raises StudyError where one of them is killed."""
     # Forking a process with numba's threads in it is not safe; a spawned one starts clean.
-    """A process pool that ignores Ctrl-C in its workers."""
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _leave_ctrl_c_to_the_parent)
     try:
         yield pool
+    except BrokenProcessPool as died:
+        raise StudyError(
+            "A worker process was killed",
+            "It ended without a word: from outside, or by the system for want of memory.",
+            "Run the same command again: it goes on where it stopped. Where memory is short, use fewer --workers.",
+            saved="What was finished is kept.",
+        ) from died
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 

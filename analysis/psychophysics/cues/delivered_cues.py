@@ -42,6 +42,8 @@ class DeliveredTrials:
     """The direction that was answered, in the same signs."""
     nominal_db: FloatArray
     """Level of the staircase, re 1 N."""
+    played_db: FloatArray
+    """Level that was played, re 1 N: as the staircase's, unless it was roved."""
     values_db: dict[Cue, FloatArray]
     """NaN where a trial was not measured for the cue; without cues that no trial was measured for."""
 
@@ -74,6 +76,7 @@ def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
                 side=signs * np.array([3.0 - 2.0 * trial.direction_shown for trial in rows]),
                 answer=signs * np.array([3.0 - 2.0 * (trial.answer or 0) for trial in rows]),
                 nominal_db=_db([trial.staircase_n for trial in rows]),
+                played_db=_db([trial.level_n for trial in rows]),
                 values_db={cue: _db(values) for cue, value in _VALUES.items() if (values := _known(rows, value))},
             )
         )

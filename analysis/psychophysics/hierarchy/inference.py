@@ -61,7 +61,7 @@ class DirectionLimit:
     """Frequency at which the median participant's threshold reaches the cap."""
 
     frequency_hz: float | None
-    """The frequency; None where it lies outside the range that was played, or is reached more than once."""
+    """The frequency; None where it lies outside the range that was played, or is reached from below more than once."""
     lower_hz: float | None
     """Lower bound; None: below the lowest frequency played."""
     upper_hz: float | None
@@ -154,7 +154,10 @@ def direction_limit(
     middle = lines.mean(axis=0)
     half = student.ppf(0.5 + confidence / 2, n - 1) * lines.std(axis=0, ddof=1) / math.sqrt(n)
     crossings = np.flatnonzero((middle[:-1] < cap_db) & (middle[1:] >= cap_db))
-    possible = np.flatnonzero((middle - half <= cap_db) & (middle + half >= cap_db))
+    may_be = (middle - half <= cap_db) & (middle + half >= cap_db)
+    # The frequencies of the grid may all miss an interval that is narrower than their distance.
+    may_be[crossings] = True
+    possible = np.flatnonzero(may_be)
     lower = float(grid[possible[0]]) if len(possible) and possible[0] > 0 else None
     upper = float(grid[possible[-1]]) if len(possible) and possible[-1] < len(grid) - 1 else None
     if len(crossings) != 1 or middle[0] >= cap_db:
@@ -162,13 +165,21 @@ def direction_limit(
     at = crossings[0]
     share = (cap_db - middle[at]) / (middle[at + 1] - middle[at])
     frequency = float(grid[at] * (grid[at + 1] / grid[at]) ** share)
-    return DirectionLimit(frequency, lower, upper, _LIMIT_WORDS)
+    return DirectionLimit(frequency, lower, upper, _back_below(middle, at, cap_db, grid) + _LIMIT_WORDS)
 
 
 _LIMIT_WORDS = (
     "A limit of this device, this cap and this task: a stronger device, another grip or another task has another. "
     "Nothing is extrapolated beyond the frequencies played."
 )
+
+
+def _back_below(middle: FloatArray, at: np.intp, cap_db: float, grid: FloatArray) -> str:
+    """Above the limit the directions may be felt again; empty where they are not."""
+    below = np.flatnonzero(middle[at + 1 :] < cap_db)
+    if not len(below):
+        return ""
+    return f"From {grid[at + 1 + below[0]]:.1f} Hz the median threshold is below the cap again. "
 
 
 def _no_limit(middle: FloatArray, cap_db: float, crossings: int, frequencies_hz: tuple[float, ...]) -> str:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,16 @@ from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS
 from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import BayesianPlacement, StaircaseRule, StepChange
 from protocols.procedure.psi import estimate, posterior
-from protocols.procedure.staircase import StaircaseState, begin, is_complete, is_finished, level_n, step, to_db
+from protocols.procedure.staircase import (
+    StaircaseState,
+    begin,
+    is_complete,
+    is_finished,
+    level_n,
+    step,
+    to_db,
+    to_newton,
+)
 
 _KEY = 0x9517
 """Separates these draws from those of whole studies."""
@@ -44,6 +54,15 @@ class RuleResult:
     """Times the root of the mean number of trials."""
     highest_n: float
     """Highest of all levels."""
+
+
+class ComparedPerson(NamedTuple):
+    """One simulated person at one frequency."""
+
+    threshold_db: float
+    """In dB re 1 N."""
+    slope: float
+    criterion: float
 
 
 def compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
@@ -93,15 +112,27 @@ def play(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> tuple[float
     spread = crowd.frequency_sd_db if isinstance(crowd.frequency_sd_db, float) else crowd.frequency_sd_db[0]
     true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, spread) * random.standard_normal()
     slope = (crowd.slope or USUAL_SLOPE[crowd.family]) * math.exp(crowd.slope_log_sd * random.standard_normal())
-    criterion = crowd.criterion_sd * random.standard_normal()
+    person = ComparedPerson(float(true_db), slope, crowd.criterion_sd * random.standard_normal())
     draws = random.random((MOST_TRIALS, 2))
-    state, highest = begin(rule), 0.0
-    while not is_finished(rule, state) and state.trials < MOST_TRIALS:
-        played_n = level_n(rule, state)
-        highest = max(highest, played_n)
-        above_db = to_db(played_n) - true_db
-        state = step(rule, state, _is_right(crowd, slope * above_db, criterion, draws[state.trials]))
-    return float(true_db), state, highest
+    # After the others, so that these are the same with roving and without.
+    state, played_n = answer_trials(crowd, rule, person, np.column_stack([draws, random.random(MOST_TRIALS)]))
+    return person.threshold_db, state, max(played_n)
+
+
+def answer_trials(
+    crowd: Crowd, rule: StaircaseRule, person: ComparedPerson, draws: FloatArray
+) -> tuple[StaircaseState, list[float]]:
+    """The run's last state, and the level of each trial as played (N). draws: (trials, 3) in [0, 1), for the
+    direction, the answer, and the amplitude where levels are roved; Psi plays its levels as they are."""
+    state, played = begin(rule), list[float]()
+    rove_db = 0.0 if rule.is_bayesian else crowd.rove_db
+    while not is_finished(rule, state) and state.trials < len(draws):
+        draw = draws[state.trials]
+        due_n = level_n(rule, state)
+        played.append(to_newton(to_db(due_n) + rove_db * (float(draw[2]) - 0.5)) if rove_db else due_n)
+        steps = person.slope * (to_db(played[-1]) - person.threshold_db)
+        state = step(rule, state, _is_right(crowd, steps, person.criterion, draw))
+    return state, played
 
 
 def _is_right(crowd: Crowd, steps: float, criterion: float, draw: FloatArray) -> bool:

@@ -37,9 +37,9 @@ class FeltDelivery:
 def felt_delivery(
     trials: Iterable[Trial], frequencies_hz: Sequence[float], flawless_mps2_per_n: Sequence[float]
 ) -> FeltDelivery:
-    """Medians over the measured test trials, by levels rounded to 1 dB. flawless_mps2_per_n: along the direction, at
-    each frequency. What no trial of a level was measured for counts as absent. Raises ValueError where a frequency
-    lacks a measured direction."""
+    """Medians over the measured test trials, by played levels rounded to 1 dB. flawless_mps2_per_n: along the
+    direction, at each frequency. What no trial of a level was measured for counts as absent. Raises ValueError where a
+    frequency lacks a measured direction."""
     groups = {group.frequency_hz: group for group in delivered_trials(trials)}
     if missing := [f"{f:g} Hz" for f in frequencies_hz if f not in groups or len(set(groups[f].side.tolist())) < 2]:
         raise ValueError(f"no measured trials of both directions at {', '.join(missing)}")
@@ -52,9 +52,11 @@ def felt_delivery(
 
 
 def _table(group: DeliveredTrials, side: float, flawless: float) -> Table:
-    strength = 10.0 ** (group.values_db[Cue.INTENSITY] / 20.0) / flawless
+    # Over the level that was played: that of the staircase differs from it where levels were roved.
+    over_played_db = group.values_db[Cue.INTENSITY] + group.nominal_db - group.played_db
+    strength = 10.0 ** (over_played_db / 20.0) / flawless
     columns = (strength, strength * _share(group, Cue.COUPLING), strength * _share(group, Cue.SPECTRUM))
-    rounded = np.round(group.nominal_db)
+    rounded = np.round(group.played_db)
     rows: list[Row] = []
     for level_db in np.unique(rounded[group.side == side]):
         mine = (group.side == side) & (rounded == level_db)

@@ -60,6 +60,9 @@ class Crowd:
     """Most such repeats in a run."""
     delivery: FeltDelivery | None = None
     """Delivery of the commands by a device; None: people feel the commands. Thresholds are those on an ideal device."""
+    rove_db: float = 0.0
+    """Range from which the amplitude of each trial is drawn around the staircase's level, as a protocol's
+    `stimulus.rove_db`; Psi plays its levels as they are."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,7 +180,7 @@ def _play_sessions(
 ) -> list[RunFound]:
     """Fills the tracks, person by person with their habits. Returns what each run came to, in the order of tracks."""
     habits, k = np.random.default_rng(key), len(crowd.frequencies_hz)
-    play = partial(play_psi, pack_psi(rule)) if rule.is_bayesian else partial(play_run, pack(rule))
+    play = partial(play_psi, pack_psi(rule)) if rule.is_bayesian else partial(play_run, pack(rule, crowd.rove_db))
     found = [RunFound(0, 0)] * len(participants)
     for first in range(0, len(participants), k):
         guesses, drift = habits.random() < crowd.guessers, 0.01 * crowd.criterion_drift_sd * habits.standard_normal()

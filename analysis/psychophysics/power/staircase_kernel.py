@@ -37,9 +37,11 @@ class PackedRule(NamedTuple):
     averaged: int
     initial: bool
     trial_limit: int
+    rove_db: float = 0.0
+    """Range from which the amplitude of each trial is drawn evenly, with the level of the staircase in its middle."""
 
 
-def pack(rule: StaircaseRule) -> PackedRule:
+def pack(rule: StaircaseRule, rove_db: float = 0.0) -> PackedRule:
     """The numbers of a staircase rule for the compiled kernel, with levels in dB re 1 N."""
     sizes = [phase.step_db for phase in rule.steps for _ in range(phase.reversals)]
     change = {StepChange.AT_REVERSAL: 0, StepChange.AT_NEXT_REVERSAL: 1, StepChange.AFTER_REVERSAL: 2}
@@ -55,6 +57,7 @@ def pack(rule: StaircaseRule) -> PackedRule:
         rule.averaged_reversals,
         rule.initial_one_up_one_down,
         rule.trial_limit,
+        rove_db,
     )
 
 
@@ -93,11 +96,11 @@ class Track(NamedTuple):
     """Arrays that a run fills in."""
 
     level_db: FloatArray
-    """(MOST_TRIALS,), as the next two."""
+    """(MOST_TRIALS,), as the next two: levels as played."""
     side: FloatArray
     right: FloatArray
     reversal_db: FloatArray
-    """(reversals,); not filled by Psi."""
+    """(reversals,): levels of the staircase; not filled by Psi."""
 
 
 @njit(cache=True)
@@ -181,6 +184,12 @@ def give_answer(person: Participant, level_db: float, trial: int, left: int) -> 
 
 
 @njit(cache=True)
+def play_around(level_db: float, rove_db: float) -> float:
+    """The level that is played (dB), drawn around that of the staircase where the protocol roves."""
+    return level_db + rove_db * (np.random.random() - 0.5) if rove_db > 0.0 else level_db
+
+
+@njit(cache=True)
 def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> RunFound:
     """Plays until the run ends, and fills the track."""
     np.random.seed(seed)
@@ -188,8 +197,9 @@ def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> 
     left = person.repeats
     limit = min(rule.trial_limit, MOST_TRIALS) if rule.trial_limit > 0 else MOST_TRIALS
     while reversals < rule.reversals and trials < limit:
-        s, answer, left = give_answer(person, level, trials, left)
-        track.level_db[trials], track.side[trials], track.right[trials] = level, s, answer
+        played = play_around(level, rule.rove_db)
+        s, answer, left = give_answer(person, played, trials, left)
+        track.level_db[trials], track.side[trials], track.right[trials] = played, s, answer
         trials += 1
         good, bad = (good + 1, 0) if answer else (0, bad + 1)
         early = rule.initial and reversals == 0

@@ -44,19 +44,12 @@ class Engine:
                 self.close()
                 self._process = self._start_process()
             process = self._process
-        impatience = threading.Timer(PATIENCE_S, process.kill)
-        impatience.daemon = True
-        impatience.start()
-        try:
-            if process.stdin is None or process.stdout is None:
-                return False
-            process.stdin.write(f"{name}\n")
-            process.stdin.flush()
-            return process.stdout.readline().strip() == name
-        except OSError:
-            return False
-        finally:
-            impatience.cancel()
+        if answered := _ask_process(process, name):
+            return answered
+        # A process that is about to end still looks alive, and would take the next request with it.
+        process.kill()
+        process.wait()
+        return answered
 
     def end(self) -> None:
         """Kill the process permanently; a caller that is waiting gets False."""
@@ -82,6 +75,22 @@ class Engine:
                 stderr=log,
                 text=True,
             )
+
+
+def _ask_process(process: "subprocess.Popen[str]", name: str) -> bool:
+    impatience = threading.Timer(PATIENCE_S, process.kill)
+    impatience.daemon = True
+    impatience.start()
+    try:
+        if process.stdin is None or process.stdout is None:
+            return False
+        process.stdin.write(f"{name}\n")
+        process.stdin.flush()
+        return process.stdout.readline().strip() == name
+    except OSError:
+        return False
+    finally:
+        impatience.cancel()
 
 
 Workers = int | Executor

@@ -1,5 +1,6 @@
 """Summary of a blind test for the terminal, misses first."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
@@ -40,16 +41,27 @@ def control_lines(proof: Proof) -> Iterator[str]:
 
 
 def remarks(proof: Proof) -> Iterator[str]:
-    """What limits this blind test: cases left out, or answers from several versions of the code."""
+    """What limits this blind test: cases left out or without an answer, or answers from several versions of the code."""
     if proof.left_out:
         yield (
             f"{proof.left_out} cases of the second physics engine were left out: MuJoCo is not installed "
             "(pip install 'hapteq[prove]')."
         )
+    if died := unanswered(proof):
+        cases = "1 case has no answer" if died == 1 else f"{died} cases have no answer"
+        yield (
+            f"{cases}, because the processes were killed or took too long: counted as failed diagnoses. Run the same "
+            "command again, which asks anew."
+        )
     if set(proof.beside) - set(proof.engines):
         yield f"Follow-ups and controls were answered by another version of the diagnosis ({', '.join(proof.beside)})."
     if len(proof.engines) > 1:
         yield f"The answers come from {len(proof.engines)} versions of the diagnosis: run the bank anew for a figure."
+
+
+def unanswered(proof: Proof) -> int:
+    """Number of cases whose process died each time: a diagnosis that failed by itself says how long it took."""
+    return sum(each.diagnosis is None and math.isnan(each.seconds) for each in proof.outcomes)
 
 
 def summary(proof: Proof) -> dict[str, Any]:
@@ -58,6 +70,7 @@ def summary(proof: Proof) -> dict[str, Any]:
         "folder": str(proof.folder.path),
         "cases": len(proof.outcomes),
         "left_out": proof.left_out,
+        "unanswered": unanswered(proof),
         "seal": proof.seal,
         "engines": list(proof.engines),
         "figures": {

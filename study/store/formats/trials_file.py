@@ -1,5 +1,6 @@
 """`trials.csv`: one row per presentation, derived from the log."""
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -29,6 +30,12 @@ def read_trials(path: Path) -> tuple[Trial, ...]:
     return trials
 
 
+def _not_finite(trial: Trial) -> list[str]:
+    """Columns that hold an infinity or NaN, which no session writes: what is missing is left empty."""
+    values = ((name, getattr(trial, name)) for name in TRIALS_HEADER)
+    return [name for name, value in values if isinstance(value, float) and not math.isfinite(value)]
+
+
 def trial_problems(trials: Iterable[Trial]) -> tuple[str, ...]:
     """Rows that no session can have written."""
     found = []
@@ -41,4 +48,5 @@ def trial_problems(trials: Iterable[Trial]) -> tuple[str, ...]:
             found.append(f"line {line}: correct does not follow from direction_shown and answer")
         if not (trial.level_n > 0 and trial.frequency_hz > 0):
             found.append(f"line {line}: level_n and frequency_hz must be above 0")
+        found += [f"line {line}: {name} is not finite; leave it empty if unknown" for name in _not_finite(trial)]
     return tuple(found)

@@ -11,7 +11,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY
 from protocols.definition.recording_protocol import RecordingProtocol
-from protocols.document.loading import ProtocolError, load_protocol
+from protocols.document.loading import ProtocolError
 from protocols.document.schema import ADAPTERS, protocol_schema
 from study.importing.map_format.import_map import ChannelMap, ComputedMap
 from study.importing.map_format.map_toml import KIND as MAP_KIND
@@ -25,6 +25,7 @@ from study.store.formats.daily_check_file import read_daily_check
 from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model
+from study.store.formats.participant_texts import load_in_language
 from study.store.formats.real_answer_file import read_real_answer
 from study.store.formats.recording_file import read_recording
 from study.store.formats.repeats_file import FORMAT as REPEATS_FORMAT
@@ -131,7 +132,7 @@ def recognise_protocol(content: FileContent) -> str | None:
     if not (content.toml or {}).keys() & _PROTOCOL_KEYS:
         return None
     try:
-        found = load_protocol(content.text or "", content.path.name)
+        found, _ = load_in_language(content.text or "", content.path.name, content.path.parent)
     except ProtocolError as error:
         raise UnusableFileError(content.path, "protocol", tuple(str(problem) for problem in error.problems)) from error
     kind = "recording" if isinstance(found, RecordingProtocol) else "study"

@@ -6,7 +6,6 @@ from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from analysis.figures.power_curves import power_picture
 from analysis.psychophysics.power.power_curve import (
     PowerPoint,
     Share,
@@ -24,12 +23,11 @@ from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import read_text
-from study.workflows.picture_files import write_pictures
 from study.workflows.run_on_executor import finished_pieces
 
 CHUNK = 10
 """Studies per piece of work: some seconds, so that little is lost when a worker dies."""
-HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery")
+HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery", "rove_db")
 """Fields of `Crowd` that were added later; at their defaults, a folder that was begun earlier can be continued."""
 FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
 
@@ -85,10 +83,18 @@ def simulate_power(
     # In the order of the plan, not of finishing: sums of the same numbers are then the same to the bit.
     points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
     payload = {"plan": _plan_facts(plan), "judged_hz": plan.pair_hz, "points": [asdict(point) for point in points]}
-    effect_db, means = true_difference_db(plan.crowd, plan.contrast_hz), threshold_words(plan.rule).means
     write_json(out / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
-    write_pictures(out / "figures", (power_picture(points, effect_db, plan.pair_hz, means),))
+    _write_figure(out / "figures", plan, points)
     return points
+
+
+def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -> None:
+    # Imported here: matplotlib takes a worker, which draws nothing, as long as its first ten studies.
+    from analysis.figures.power_curves import power_picture
+    from study.workflows.picture_files import write_pictures
+
+    effect_db, means = true_difference_db(plan.crowd, plan.contrast_hz), threshold_words(plan.rule).means
+    write_pictures(folder, (power_picture(points, effect_db, plan.pair_hz, means),))
 
 
 def judge_piece(plan: PowerPlan, piece: Piece) -> list[StudyVerdict]:

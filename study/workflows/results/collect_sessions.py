@@ -98,7 +98,8 @@ def _folders(data: Path) -> tuple[SessionFolder, ...]:
         raise WrongUseError(
             "There is nothing to analyse",
             f"{data} is neither a session nor a folder with sessions in it.",
-            "Give the data folder of a study; hapteq rehearse makes one with simulated participants.",
+            "Give the data folder of a study, or its export as psych-ds or csv (bids and mat are for other tools and "
+            "are not read back); hapteq rehearse makes one with simulated participants.",
         )
     return folders
 

@@ -1,6 +1,7 @@
 """Export a study's trials for other tools, with protocol, seeds and versions; read such a dataset back."""
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -9,6 +10,8 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import dump_protocol
 from protocols.document.hashing import protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
+from protocols.trial import Trial
+from study.errors import StudyError
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.new_folder import new_folder, require_new_folder
 from study.store.disk.provenance import gather_provenance
@@ -21,6 +24,8 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.written_elsewhere import note_written
 from study.workflows.results.collected import CollectedTrials
 
+MOST_LEFT_OUT = 10_000
+"""A larger number in an edited file is no number of sessions."""
 Form = Literal["psych-ds", "bids", "mat", "csv"]
 WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
     "psych-ds": write_psych_ds,
@@ -65,7 +70,38 @@ def _facts(collected: CollectedTrials) -> dict[str, Any]:
         "devices": list(collected.devices),
         "observers": list(collected.observers),
         "locked": collected.locked,
+        # A number: its sentences name sessions of people who withdrew.
+        "left_out_count": len(collected.left_out),
+        "model_qualities": [list(each) for each in collected.qualities],
     }
+
+
+def _check_rows(folder: Path, trials: Sequence[Trial], kind: str) -> None:
+    """Raises StudyError where there is no trial, UnusableFileError where a presentation is there twice."""
+    if not trials:
+        raise StudyError("There is nothing to analyse", f"{folder} holds no trial.", "Export the study again.")
+    rows = Counter((trial.session, trial.run, trial.trial, trial.attempt) for trial in trials)
+    twice = [
+        f"session {session}, run {run}, trial {trial}, attempt {attempt} is there {count} times"
+        for (session, run, trial, attempt), count in rows.items()
+        if count > 1
+    ]
+    if twice:
+        raise UnusableFileError(folder, kind, tuple(twice))
+
+
+def _left_out(facts: Mapping[str, Any]) -> tuple[str, ...]:
+    """One sentence for each that was left out before the export; none where an older export does not say."""
+    count = facts.get("left_out_count", 0)
+    if not isinstance(count, int) or not 0 <= count <= MOST_LEFT_OUT:
+        return ()
+    return tuple(f"Before the export, {number} of {count} was left out." for number in range(1, count + 1))
+
+
+def _qualities(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    found = facts.get("model_qualities", [])
+    rows = found if isinstance(found, list) else []
+    return tuple((str(row[0]), str(row[1])) for row in rows if isinstance(row, list) and len(row) == 2)
 
 
 def is_exported(folder: Path) -> bool:
@@ -85,6 +121,7 @@ def collect_exported(folder: Path) -> CollectedTrials:
         raise UnusableFileError(path, kind, tuple(str(each) for each in error.problems)) from error
     if not isinstance(protocol, StudyProtocol):
         raise UnusableFileError(path, kind, ("it is no protocol of a study",))
+    _check_rows(folder, found.trials, kind)
     seeds = found.facts.get("seeds", {})
     sessions = tuple(dict.fromkeys(trial.session for trial in found.trials))
     return CollectedTrials(
@@ -95,8 +132,8 @@ def collect_exported(folder: Path) -> CollectedTrials:
         seeds=tuple(int(seeds.get(name, 0)) for name in sessions),
         devices=tuple(map(str, found.facts.get("devices", ()))),
         observers=tuple(map(str, found.facts.get("observers", ()))),
-        left_out=(),
-        qualities=(),
+        left_out=_left_out(found.facts),
+        qualities=_qualities(found.facts),
         locked=str(found.facts.get("locked", "not known")),
         finished=(),
         parents=(*found.files, path),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.figures.power_curves import power_picture
+from analysis.figures.style import PAGE_IN
 from analysis.psychophysics.power.power_curve import PowerPoint, Share
 
 
@@ -25,13 +26,19 @@ def test_each_analysis_has_a_curve_with_the_interval_of_its_shares():
 
 @pytest.mark.parametrize(("effect_db", "level"), [(3.0, 80.0), (0.0, 5.0)])
 def test_the_line_is_the_power_asked_for_or_without_an_effect_the_level_of_the_test(effect_db, level):
-    above, _ = power_picture([point(10)], effect_db, (45.0, 5.0)).figure.axes
+    picture = power_picture([point(10)], effect_db, (45.0, 5.0))
+    assert f"Grey lines: {level:g} %, " in picture.caption
+    above, _ = picture.figure.axes
     assert any(np.allclose(line.get_ydata(), [level, level]) for line in above.lines)
 
 
 def test_the_caption_says_that_without_an_effect_each_find_is_an_error():
     assert "type-1 error" in power_picture([point(10)], 0.0, (45.0, 5.0)).caption
     assert "finds the difference" in power_picture([point(10)], 3.0, (45.0, 5.0)).caption
+
+
+def test_it_is_as_wide_as_the_other_figures_for_a_paper():
+    assert power_picture([point(10)], 3.0, (45.0, 5.0)).figure.get_size_inches()[0] == PAGE_IN
 
 
 def test_the_title_says_which_frequencies_are_compared():

@@ -81,6 +81,11 @@ def test_what_was_declared_and_what_was_not_is_reported():
     assert "Not declared" not in declaration_text(
         AnalysisSettings("published", (45.0, 5.0), 10, ("No participant is left out.",))
     )
+    by_name = declaration_text(AnalysisSettings("hierarchical", (45.0, 5.0), 10, (), "paired_t"))
+    assert "Declared interval (paired_t) of the contrast: 95 %, over people's pseudo-thresholds" in by_name
+    assert "Not declared: interval method, primary contrast and exclusions." in declaration_text(
+        AnalysisSettings(participants=10)
+    )
 
 
 def test_the_page_and_the_document_show_both(analysis):

@@ -5,7 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.document.hashing import protocol_hash
+from protocols.document.loading import ProtocolError, load_protocol
 from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_of, lock_to_json
 
 WHEN = "2024-05-01T09:00:00+00:00"
@@ -68,3 +70,55 @@ def test_a_torn_document_is_told_so(text):
 def test_a_list_is_no_lock():
     with pytest.raises(LockError, match="and this document does not"):
         lock_from_json("[]")
+
+
+OLDER_HASH = "a1e0be03b8f5f359dfac16b3fb28a8e18b27a1505ca4fddab0bc990fecb6ecf7"
+DECLARED = {
+    "primary": "hierarchical",
+    "contrast_hz": (45.0, 5.0),
+    "participants": 10,
+    "exclusions": ("No participant is left out.",),
+    "interval": "paired_t",
+}
+OTHERS = {
+    "contrast_hz": (35.0, 5.0),
+    "participants": 11,
+    "exclusions": (),
+    "interval": "undeclared",
+}
+
+
+@pytest.mark.parametrize("key", list(OTHERS))
+def test_contrast_sample_size_exclusions_and_interval_are_locked_each_by_its_own_key(threshold, key):
+    declared = replace(threshold, analysis=AnalysisSettings(**DECLARED))
+    fixed = lock_of(declared, WHEN, "0.1.0")
+    check_lock(fixed, declared, LOCAL)
+    changed = replace(threshold, analysis=AnalysisSettings(**{**DECLARED, key: OTHERS[key]}))
+    with pytest.raises(LockError, match="has changed since"):
+        check_lock(fixed, changed, LOCAL)
+
+
+def test_a_lock_of_before_intervals_were_declared_by_name_still_fits(threshold_text):
+    """Its hash is that of the version before `interval` was a key."""
+    text = "\n".join(line for line in threshold_text.splitlines() if not line.startswith("interval ="))
+    text = text.replace('primary = "undeclared"', 'primary = "hierarchical"')
+    text = text.replace("contrast_hz = []", "contrast_hz = [45.0, 5.0]").replace(
+        "participants = 0", "participants = 10"
+    )
+    older = ProtocolLock("direction_threshold", OLDER_HASH, WHEN, "0.1.0")
+    check_lock(older, load_protocol(text, "mine.toml"), LOCAL)
+
+
+@pytest.mark.parametrize(
+    ("primary", "interval", "allowed"),
+    [
+        ("hierarchical", "tukey", "paired_t, or undeclared"),
+        ("published", "paired_t", "tukey, or undeclared"),
+        ("undeclared", "tukey", "undeclared, or declare primary, too"),
+    ],
+)
+def test_an_interval_that_the_primary_analysis_does_not_compute_is_refused(threshold_text, primary, interval, allowed):
+    text = threshold_text.replace('primary = "undeclared"', f'primary = "{primary}"')
+    text = text.replace('interval = "undeclared"', f'interval = "{interval}"')
+    with pytest.raises(ProtocolError, match=rf"analysis.interval is {interval}, while primary is {primary}.*{allowed}"):
+        load_protocol(text, "mine.toml")

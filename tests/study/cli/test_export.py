@@ -3,6 +3,8 @@
 import csv
 import json
 import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,7 +18,10 @@ from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 from study.store.formats.trials_file import read_trials
 from study.store.formats.trials_mat import write_trials_mat
+from study.workflows.results.collect_sessions import collect_sessions
+from study.workflows.results.export_study import collect_exported, export_study
 
+FLOAT = re.compile(r"\d+\.\d+")
 PSYCH_DS_FILE = re.compile(r"[a-z]+-[A-Za-z0-9]+(_[a-z]+-[A-Za-z0-9]+)*_data\.csv")
 
 
@@ -67,6 +72,39 @@ def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, cap
         del document["provenance"]
     assert first == second
     assert (tmp_path / "a" / "thresholds.csv").read_bytes() == (tmp_path / "b" / "thresholds.csv").read_bytes()
+
+
+@pytest.mark.usefixtures("sketched")
+@pytest.mark.parametrize("form", ["psych-ds", "csv"])
+def test_what_was_left_out_before_an_export_is_counted_after_it_without_a_name(data, tmp_path, capsys, form):
+    mine = tmp_path / "data"
+    shutil.copytree(data, mine)
+    assert main(["study", "--protocol", str(data.parent / "small.toml"), "--observer", "ideal", "--seed", "3",
+                 "--subject", "P77", "--data", str(mine)]) == 0  # fmt: skip
+    assert main(["withdraw", "P77_001", "--data", str(mine), "--yes"]) == 0
+    assert main(["export", str(mine), "--out", str(tmp_path / "ds"), "--format", form]) == 0
+    assert not any("P77" in path.read_text("utf-8") for path in (tmp_path / "ds").rglob("*.*") if path.is_file())
+    capsys.readouterr()
+    for source, out in ((mine, tmp_path / "a"), (tmp_path / "ds", tmp_path / "b")):
+        assert main(["analyze", str(source), "--out", str(out)]) == 0
+    assert "Note: Before the export, 1 of 1 was left out." in capsys.readouterr().err
+    first, second = (json.loads((tmp_path / name / "anova.json").read_text("utf-8")) for name in "ab")
+    assert first["declared_result"]["left_out_count"] == 1
+    assert first["declared_result"] == second["declared_result"]
+
+
+@pytest.mark.parametrize("count", ['"many"', "-1", "1e9", "10001"])
+def test_a_count_that_is_none_is_not_believed(data, tmp_path, count):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", "csv"]) == 0
+    facts = tmp_path / "ds" / "facts.json"
+    facts.write_text(facts.read_text("utf-8").replace('"left_out_count": 0', f'"left_out_count": {count}'), "utf-8")
+    assert collect_exported(tmp_path / "ds").left_out == ()
+
+
+def test_the_quality_of_models_comes_back_from_an_export(data, tmp_path):
+    collected = replace(collect_sessions(data), qualities=(("P01_001 and P02_001", "It predicts 90 %."),))
+    export_study(collected, data, tmp_path / "ds", "psych-ds")
+    assert collect_exported(tmp_path / "ds").qualities == collected.qualities
 
 
 def test_one_table_has_every_trial_and_a_dictionary_of_its_columns(data, tmp_path):
@@ -149,3 +187,33 @@ def test_a_table_with_a_wrong_row_is_named(data, tmp_path, capsys):
     path.write_text("\n".join([header, ",".join(fields), *rest]) + "\n")
     assert main(["analyze", str(tmp_path / "ds")]) != 0
     assert path.name in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", ["psych-ds", "csv"])
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda lines: [*lines[:2], lines[1], *lines[2:]], "is there 2 times"),
+        (lambda lines: [lines[0], FLOAT.sub("inf", lines[1], 1)], "is not finite"),
+        (lambda lines: [lines[0], FLOAT.sub("nan", lines[1], 1)], "is not finite"),
+        (lambda lines: lines[:1], "There is nothing to analyse"),
+    ],
+)
+def test_rows_twice_numbers_that_are_none_and_no_rows_are_refused(data, tmp_path, capsys, form, spoil, said):
+    """In any phase: what is no run of a staircase is not replayed, and would not contradict the protocol."""
+    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", form]) == 0
+    for path in (tmp_path / "ds").rglob("*.csv"):
+        lines = path.read_text("utf-8").splitlines()
+        if "level_n" in lines[0].split(",") and "session" in lines[0].split(","):
+            path.write_text("\n".join(spoil(lines)) + "\n", "utf-8")
+    capsys.readouterr()
+    assert main(["analyze", str(tmp_path / "ds"), "--out", str(tmp_path / "out")]) == 1
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("form", ["bids", "mat"])
+def test_a_form_that_is_not_read_back_is_refused_with_those_that_are(data, tmp_path, capsys, form):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", form]) == 0
+    assert main(["analyze", str(tmp_path / "ds"), "--out", str(tmp_path / "out")]) == 2
+    assert "its export as psych-ds or csv (bids and mat" in " ".join(capsys.readouterr().err.split())

@@ -54,3 +54,16 @@ def test_people_feel_what_a_device_delivered_in_sessions(tmp_path, small_text, c
     assert main([*ASKED, *small, "--out", str(tmp_path / "felt")]) == 1  # another plan
     assert main([*ASKED, "--out", str(tmp_path / "no"), "--delivered", data]) == 2
     assert "no measured trials of both directions at" in capsys.readouterr().err
+
+
+def test_a_protocol_that_roves_its_levels_is_simulated_so_and_it_is_said(tmp_path, small_text, capsys):
+    roved = small_text.replace("fade_in_s = 0.1", "fade_in_s = 0.1\nrove_db = 6.0").replace(
+        "cap_n = 3.0\nup", "cap_n = 2.12\nup"
+    )
+    (tmp_path / "roved.toml").write_text(roved)
+    mine = ("--protocol", str(tmp_path / "roved.toml"))
+    assert plan_of(tmp_path / "roved", *mine)["rove_db"] == 6.0
+    assert "Levels roved by 6 dB, as the protocol says." in capsys.readouterr().out
+    assert main(["power", "--compare", "--studies", "10", *mine, "--people", "repeating"]) == 0
+    said = capsys.readouterr().out
+    assert "Roved by 6 dB" in said and "people are attentive" in said

@@ -1,10 +1,19 @@
 """Pieces of work on an executor: what finished is handed over before an error ends the whole."""
 
+import os
+import platform
+import resource
+import signal
+import subprocess
+import sys
 from concurrent.futures import Executor, Future
 
+import numpy as np
 import pytest
 
+from study.errors import StudyError
 from study.workflows.run_on_executor import finished_pieces
+from study.workflows.worker_processes import worker_processes
 
 
 class AtOnce(Executor):
@@ -26,3 +35,41 @@ def test_results_that_are_there_come_before_an_error_beside_them():
         for key, _ in finished_pieces(AtOnce(), divmod, pieces):
             came.append(key)
     assert sorted(came) == [number for number in range(20) if number % 2]
+
+
+def faults_of_arrays(rounds):
+    """Pages that the system had to find (page faults): six arrays of 2 MB that are made and freed, round by round."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(rounds):
+        arrays = [np.ones(2**18) for _ in range(6)]
+        del arrays
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries have limits of their own")
+def test_a_worker_keeps_the_memory_that_its_fits_free_and_ask_for_again():
+    with worker_processes(1) as pool:
+        ((_, faults),) = finished_pieces(pool, faults_of_arrays, [("arrays", (100,))])
+    once = 6 * 2**21 / resource.getpagesize()
+    assert faults < 3 * once  # a hundred times as many where each round gets its pages anew
+
+
+def test_workers_of_power_do_not_load_what_draws():
+    asked = "import sys; import study.workflows.planning.simulate_power; print('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout == "False\n"
+
+
+def killed(number):
+    """As by the system for want of memory."""
+    os.kill(os.getpid(), signal.SIGKILL if number == 3 else 0)
+    return number
+
+
+@pytest.mark.timeout(120)
+def test_a_killed_worker_is_an_error_that_says_what_is_kept_and_what_to_do():
+    came = []
+    told = pytest.raises(StudyError, match=r"worker process was killed.*finished is kept.*goes on where it stopped")
+    with told, worker_processes(1) as pool:
+        for key, _ in finished_pieces(pool, killed, ((number, (number,)) for number in range(6))):
+            came.append(key)
+    assert came == [0, 1, 2]

@@ -1,5 +1,7 @@
 """The primary analysis finds what was planted, near the cap too, and finds nothing where nothing is."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -124,6 +126,24 @@ def test_the_direction_limit_lies_where_the_line_meets_the_cap():
     found = direction_limit(HZ, pseudo, 10.0, 0.95)
     assert found.frequency_hz == pytest.approx((35 * 45) ** 0.5, rel=0.02)
     assert 35.0 < found.lower_hz < found.frequency_hz < found.upper_hz < 45.0
+
+
+def test_a_median_that_falls_below_the_cap_again_is_told_beside_the_limit():
+    rng = np.random.default_rng(4)
+    pseudo = np.array([-8.0, -4.0, 0.0, 14.0, 6.0]) + 0.3 * rng.standard_normal((10, 5))
+    found = direction_limit(HZ, pseudo, 10.0, 0.95)
+    assert found.frequency_hz == pytest.approx(25 * (35 / 25) ** (10 / 14), rel=0.02)
+    again = re.search(r"From (\d+\.\d) Hz the median threshold is below the cap again", found.words)
+    assert float(again[1]) == pytest.approx((35 * 45) ** 0.5, rel=0.02)
+    rising = np.array([-8.0, -4.0, 0.0, 8.0, 12.0]) + 0.3 * rng.standard_normal((10, 5))
+    assert "again" not in direction_limit(HZ, rising, 10.0, 0.95).words
+
+
+def test_an_interval_narrower_than_the_grid_still_holds_the_limit():
+    pseudo = np.array([-8.0, -4.0, 0.0, 8.0, 12.0]) + 1e-9 * np.arange(10)[:, None]
+    found = direction_limit(HZ, pseudo, 10.0, 0.95)
+    assert found.lower_hz == pytest.approx(found.frequency_hz, rel=0.002)
+    assert found.upper_hz == pytest.approx(found.frequency_hz, rel=0.002)
 
 
 def test_no_limit_is_said_beyond_what_was_played():

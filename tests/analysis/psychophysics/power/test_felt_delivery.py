@@ -27,21 +27,22 @@ ROUGH = FeltDelivery(((RISING, ((-3.0, 1.1, 0.7, 0.6), (3.0, 1.2, 0.7, 0.1))),),
 CIRCLE = FeltDelivery(((RISING, ((0.0, 0.3, 1.2, 0.0),)),))
 
 
-def slow_run(delivery, threshold_n, seed):
+def slow_run(delivery, threshold_n, seed, rule=PUBLISHED, rove_db=0.0):
     """The observer of sessions and the rule of sessions, on the random numbers of the compiled run."""
     feeler = DirectionFeeler("slow", ((HZ, threshold_n),), slope=1.7, lapse=0.03, criterion=0.2)
     observer = DeliveredFeeler("slow", feeler, delivery.masking, delivery.adaptation_db, delivery.adaptation_trials)
-    random, state, found = np.random.RandomState(seed), begin(PUBLISHED), []
-    while not is_finished(PUBLISHED, state):
+    random, state, found = np.random.RandomState(seed), begin(rule), []
+    while not is_finished(rule, state):
+        level_db = state.level_db + (rove_db * (random.random_sample() - 0.5) if rove_db else 0.0)
         direction, trial = (1 if random.random_sample() < 0.5 else 2), len(found)
-        level_n, table = 10.0 ** (state.level_db / 20.0), np.array(delivery.tables[0][direction - 1])
-        along, across, harmonics = (np.interp(state.level_db, table[:, 0], table[:, place]) for place in (1, 2, 3))
+        level_n, table = 10.0 ** (level_db / 20.0), np.array(delivery.tables[0][direction - 1])
+        along, across, harmonics = (np.interp(level_db, table[:, 0], table[:, place]) for place in (1, 2, 3))
         flawless = PER_NEWTON * level_n
         measured = Delivered(along * flawless, across * flawless, 0.1, harmonics * flawless)
         felt = PerceivedStimulus(0, trial, 0, Phase.TEST, HZ, level_n, direction, trial, delivered=measured)
         right = random.random_sample() < observer.share_right(felt)
-        found.append((state.level_db, direction, right))
-        state = step(PUBLISHED, state, bool(right))
+        found.append((level_db, direction, right))
+        state = step(rule, state, bool(right))
     return found
 
 

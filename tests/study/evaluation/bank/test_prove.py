@@ -40,6 +40,15 @@ def test_a_bank_is_sealed_answered_and_revealed(proof):
     assert len(done.engines) == 1
 
 
+def test_a_case_without_an_answer_is_said_and_how_to_go_on(proof):
+    done, _ = proof
+    assert summary(done)["unanswered"] == 0 and not any("no answer" in line for line in proof_lines(done))
+    lost = replace(done.outcomes[0], diagnosis=None, seconds=math.nan)
+    missing = replace(done, outcomes=(lost, *done.outcomes[1:]))
+    assert summary(missing)["unanswered"] == 1
+    assert any("1 case has no answer" in line and "same command again" in line for line in proof_lines(missing))
+
+
 def test_seals_are_read_by_sha256sum_and_come_before_any_answer(proof):
     folder = proof[0].folder
     checked = subprocess.run(["sha256sum", "--check", "--status", "labels.sha256"], cwd=folder.path, check=False)

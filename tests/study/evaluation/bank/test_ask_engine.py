@@ -1,0 +1,56 @@
+"""Processes of a diagnosis that are killed: a case is tried as often as is said, and what has no answer is counted."""
+
+import subprocess
+import sys
+
+import pytest
+
+from study.evaluation.bank.ask_engine import TRIES, Engine
+from study.evaluation.bank.proof_folder import ProofFolder
+
+DYING = "import os, sys, time; sys.stdin.readline(); os.close(1); time.sleep(60)"
+"""Has closed its pipe, as a killed process does at once, and is not gone yet."""
+ANSWERING = "import sys; [print(line, end='', flush=True) for line in sys.stdin]"
+
+
+class Replaced(Engine):
+    """Starts these programs, one after another, and the last again and again."""
+
+    def __init__(self, folder, programs):
+        super().__init__(folder)
+        self.left, self.started = list(programs), []
+
+    def _start_process(self):
+        program = self.left.pop(0) if len(self.left) > 1 else self.left[0]
+        self.started.append(
+            subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        )
+        return self.started[-1]
+
+
+@pytest.fixture
+def engine(tmp_path):
+    made = []
+
+    def make(*programs):
+        made.append(Replaced(ProofFolder(tmp_path), programs))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.end()
+        each.close()
+
+
+@pytest.mark.timeout(60)
+def test_a_process_that_dies_costs_a_single_try(engine):
+    asked = engine(DYING, ANSWERING)
+    assert [asked.ask("a"), asked.ask("a"), asked.ask("b")] == [False, True, True]
+    assert len(asked.started) == 2 and asked.started[0].poll() is not None
+
+
+@pytest.mark.timeout(60)
+def test_a_case_that_kills_every_process_is_given_up(engine):
+    asked = engine(DYING)
+    assert not any(asked.ask("a") for _ in range(TRIES))
+    assert len(asked.started) == TRIES
