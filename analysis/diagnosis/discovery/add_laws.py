@@ -31,8 +31,8 @@ from equalizer.laws.law import Law
 
 @dataclass(slots=True)
 class LawSearch:
-    """The search for laws, beyond the catalogue. Laws are looked for beside the re-tuned model, whatever the catalogue
-    found: the same samples are searched once, and what was found is kept for the next call."""
+    """The search for laws, beyond the catalogue. Laws are looked for beside the re-tuned model, without the
+    catalogue's effects: the same samples are searched once, and what was found is kept for the next call."""
 
     progress: Progress
     time_left: TimeBudget

@@ -41,7 +41,7 @@ def control_lines(proof: Proof) -> Iterator[str]:
 
 
 def remarks(proof: Proof) -> Iterator[str]:
-    """What limits this blind test: cases left out or without an answer, or answers from several versions of the code."""
+    """What limits this blind test: cases left out or unanswered, or answers from several versions of the code."""
     if proof.left_out:
         yield (
             f"{proof.left_out} cases of the second physics engine were left out: MuJoCo is not installed "
