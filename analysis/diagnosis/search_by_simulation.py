@@ -67,7 +67,8 @@ def search_by_simulation(
     may_be_named = [effect for effect in catalogue if effect.name not in context.barred]
     if balances:
         named = any(balance.named for balance in balances)
-        imposed = bool(recordings[0].meta.get("imposed"))
+        # From commands without the force of other motions no effect of the actuator can be told.
+        imposed = fitting.is_reduced or bool(recordings[0].meta.get("imposed"))
         catalogue = [] if named else [e for e in catalogue if _unseen_by_balance(e.name, place_of_effect(e), imposed)]
         may_be_named = []
     if settings.clean:

@@ -131,7 +131,7 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
 
 
 def motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) -> float:
-    """The highest frequency of the motion of some channels; inf without a time axis."""
+    """The highest frequency of the motion of some channels; inf without a time axis. columns: their numbers."""
     if not np.isfinite(motions[0].band_hz):
         return np.inf
     ends = []

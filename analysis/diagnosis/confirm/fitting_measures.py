@@ -36,6 +36,8 @@ class FittingMeasure:
     chosen: MeasureChoice
     narrow: bool = False
     """Whether the band is limited to small noise in the force, which may leave parameters of laws undetermined."""
+    is_reduced: bool = False
+    """Whether the force of further motions, modes and a delay was subtracted from the commands."""
 
 
 def choose_fitting_measure(
@@ -55,7 +57,7 @@ def choose_fitting_measure(
     if measure.name == "free simulation":
         moved = about_operating_point(recordings, model)
     elif isinstance(measure, PredictedForce):
-        moved = _about_mean_force(recordings, model, measure)
+        moved = about_mean_force(recordings, model, measure)
     if moved is None:
         return fitting
     other = measure_of(moved, model, clean, compared)
@@ -66,7 +68,7 @@ def choose_fitting_measure(
     return FittingMeasure(model, replace(other, remarks=(*other.remarks, ABOUT_MEAN)))
 
 
-def _about_mean_force(
+def about_mean_force(
     recordings: Sequence[Recording], model: MechanicalModel, measure: PredictedForce
 ) -> tuple[Recording, ...]:
     """The recordings with a constant added to their commands, with which the force that the model needs is right on

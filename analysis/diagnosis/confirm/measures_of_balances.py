@@ -1,4 +1,4 @@
-"""The error measures by the numbers of force balances: for the laws that they name, and where they name none."""
+"""The error measures by the parameters of force balances: for the laws that they name, and where they name none."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -6,16 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
+from analysis.diagnosis.confirm.fitting_measures import ABOUT_MEAN, FittingMeasure, about_mean_force
 from analysis.diagnosis.data.measured_motion import is_quasi_static, is_read_as_free
-from analysis.diagnosis.errors.choose_measure import Compared, measure_by_force, measure_of
+from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, measure_by_force, measure_of
 from analysis.diagnosis.first_model.model_from_balance import first_model, share_within
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import LAWS_WITHIN
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
 
 BALANCE_LEAVES_LESS = (
     "Forces are predicted with the linear parameters of the force balance: they leave less of the forces than the "
@@ -61,32 +60,50 @@ def choose_plain_forces(
     model's, where these leave more of the forces, on the samples to fit and to choose by. A model that was fitted to
     spectra in closed loop may need modes that the measured motions of a second body make unnecessary."""
     measure = fitting.chosen.measure
-    named = any(balance.named for balance in balances)
-    if not balances or named or not isinstance(measure, PredictedForce):
+    named, first = any(balance.named for balance in balances), recordings[0]
+    if not balances or named or is_quasi_static(first) or is_read_as_free(first):
+        return fitting
+    if not isinstance(measure, PredictedForce):
         return fitting
     try:
-        reduced = reduce_recordings(recordings, balances) if is_reduced(balances) else recordings
-        plain = first_model(balances, reduced[0], fitting.model.name)
+        reduced = is_reduced(balances)
+        used = reduce_recordings(recordings, balances) if reduced else tuple(recordings)
+        plain = first_model(balances, used[0], fitting.model.name)
         if plain is None:
             return fitting
-        other = measure_by_force(reduced, plain, measure.band_hz)
+        chosen = _predict_about_mean(used, plain, measure.band_hz)
     except (MechanicalModelError, np.linalg.LinAlgError):
         return fitting
-    if not isinstance(other.measure, PredictedForce):
+    other = chosen.measure
+    if not isinstance(other, PredictedForce) or not _leaves_less((plain, other), (fitting.model, measure)):
         return fitting
-    forces = np.vstack([record.command[record.fit | record.choose] for record in measure.records])
-    size = np.maximum(np.sqrt(np.mean(forces**2, axis=0)), 1e-300)
-    if not _missed_force(plain, other.measure, size) < _missed_force(fitting.model, measure, size):
-        return fitting
-    return FittingMeasure(plain, replace(other, remarks=(*other.remarks, BALANCE_LEAVES_LESS)))
+    remarks = tuple(remark for remark in fitting.chosen.remarks if remark != ABOUT_MEAN)
+    return FittingMeasure(plain, replace(chosen, remarks=(*remarks, BALANCE_LEAVES_LESS)), is_reduced=reduced)
 
 
-def _missed_force(model: MechanicalModel, measure: PredictedForce, size: FloatArray) -> float:
-    """Rms error of the force that the unchanged model needs, over all axes, on the samples to fit and to choose by.
-    size: (m,): unit of each axis."""
-    residuals = measure.residuals(model, ())
-    missed = [
-        left[record.fit | record.choose] * measure.unit / size
-        for left, record in zip(residuals, measure.records, strict=True)
+def _predict_about_mean(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float) -> MeasureChoice:
+    """The measure by force with a constant command that makes the mean error zero: the balance, too, has one."""
+    chosen = measure_by_force(recordings, model, band_hz)
+    if not isinstance(chosen.measure, PredictedForce):
+        return chosen
+    return measure_by_force(about_mean_force(recordings, model, chosen.measure), model, band_hz)
+
+
+Prediction = tuple[MechanicalModel, PredictedForce]
+
+
+def _leaves_less(plain: Prediction, given: Prediction) -> bool:
+    """Whether the forces that a model needs are closer to the commands than another's, in the rms over the axes, each
+    over the rms of its command, on the samples to fit and to choose by of both."""
+    kept = [
+        (ours.fit | ours.choose) & (other.fit | other.choose)
+        for ours, other in zip(plain[1].records, given[1].records, strict=True)
     ]
-    return float(np.sqrt(np.mean(np.vstack(missed) ** 2)))
+    forces = np.vstack([record.command[mask] for record, mask in zip(given[1].records, kept, strict=True)])
+    size = np.sqrt(np.mean(forces**2, axis=0))
+    driven = size > 0
+    missed = []
+    for model, measure in (plain, given):
+        left = [each[mask] for each, mask in zip(measure.residuals(model, ()), kept, strict=True)]
+        missed.append(np.mean((np.vstack(left) * measure.unit)[:, driven] ** 2 / size[driven] ** 2))
+    return bool(missed[0] < missed[1])

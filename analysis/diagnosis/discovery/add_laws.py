@@ -6,10 +6,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain
-from analysis.diagnosis.discovery.discover import Discovery, Round, discover
+from analysis.diagnosis.discovery.discover import Discovery, Round, depends_on_another_axis, discover
 from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.discovery.validation import (
-    beats,
     choose_on_held_out,
     does_as_well_with_less,
     holds_elsewhere,
@@ -19,6 +18,7 @@ from analysis.diagnosis.discovery.validation import (
 from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
+from analysis.diagnosis.search.parsimony import leaves_far_less
 from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import is_within_data
@@ -31,8 +31,8 @@ from equalizer.laws.law import Law
 
 @dataclass(slots=True)
 class LawSearch:
-    """The search for laws, beyond the catalogue. Laws are looked for beside the re-tuned model, without the
-    catalogue's effects: the same samples are searched once, and what was found is kept for the next call."""
+    """The search for laws, beyond the catalogue. Laws are looked for beside the re-tuned model, without the catalogue's
+    effects: a search that ended by itself is not repeated on the same samples."""
 
     progress: Progress
     time_left: TimeBudget
@@ -41,41 +41,37 @@ class LawSearch:
 
     def add_short(self, result: SearchResult) -> SearchResult:
         """As `add_any`, with laws only where they are likely to explain all, and are a shorter description than two
-        effects of the catalogue: a single law of a single term, or laws of which each depends on another axis than its
-        own."""
-        found = self._discover(result, LAW_MOST_ROUNDS, alone=True)
-        if found is None or not _is_short(found):
+        effects of the catalogue: see `is_short`."""
+        if not _needs_law(result) or not self.time_left():
             return result
-        self._done.append((result.found.retuned, LAW_MOST_ROUNDS, found))
-        return weigh_laws(result, found, self.time_left)
+        found = discover(result.context, result.found, self.progress, self.time_left, LAW_MOST_ROUNDS, alone=True)
+        if found is not None and found.found.after.score.worst_channel <= NOISE_ALONE:
+            self._done.append((result.found.retuned, LAW_MOST_ROUNDS, found))
+        return weigh_laws(result, found, self.time_left) if found is not None and is_short(found) else result
 
     def add_any(self, result: SearchResult) -> SearchResult:
         """The search with discovered laws in place of its names. Unchanged where it needs no law or none is better;
         laws that fail a check of `validation` are added as unconfirmed candidates only."""
+        if not _needs_law(result) or not self.time_left():
+            return result
         fits = result.judgement.named and result.found.after.score.worst_channel <= NOISE_ALONE
         # Beside names that fit, only a single law is the shorter description.
         most = 1 if fits else LAW_MOST_ROUNDS
-        retuned = result.found.retuned
-        known = [found for model, laws, found in self._done if model is retuned and laws == most]
-        if known and not self.time_left():
-            return result
-        found = known[0] if known else self._discover(result, most)
+        known = [found for model, laws, found in self._done if model is result.found.retuned and laws == most]
         if not known:
-            self._done.append((retuned, most, found))
-        return result if found is None else weigh_laws(result, found, self.time_left)
-
-    def _discover(self, result: SearchResult, most: int, alone: bool = False) -> Discovery | None:
-        if not _needs_law(result) or not self.time_left():
-            return None
-        return discover(result.context, result.found, self.progress, self.time_left, most, alone)
+            known = [discover(result.context, result.found, self.progress, self.time_left, most)]
+            self._done.append((result.found.retuned, most, known[0]))
+        return result if known[0] is None else weigh_laws(result, known[0], self.time_left)
 
 
-def _is_short(of: Discovery) -> bool:
-    """Whether laws are a shorter description than two effects: see `LawSearch.add_short`."""
-    if len(of.rounds) == 1 and of.rounds[0].sums[0].partner is None:
-        return len(of.rounds[0].sums[0].terms) == 1
-    laws = [law for law in laws_of(of.found.after.fitted.hypothesis) if law is not None]
-    return all(any(name[-1:] != law.axis for name in law.variables) for law in laws)
+def is_short(of: Discovery) -> bool:
+    """Whether laws are a shorter description than two effects: a single term, or a term on each of several axes, each
+    of which depends on another axis."""
+    sums = [each for found in of.rounds for each in (found.sums[0], found.sums[0].partner) if each is not None]
+    places = {(each.acts_on, each.axis) for each in sums}
+    if any(len(each.terms) > 1 for each in sums) or len(places) < len(sums):
+        return False
+    return len(sums) == 1 or all(depends_on_another_axis(each) for each in sums)
 
 
 def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) -> SearchResult:
@@ -110,7 +106,7 @@ def _reasons_of_rivals(
     if known.steps and may_stand_for_a_law(context, known):
         rivals = [rival for rival in rivals if not does_as_well_with_less(context, found, rival)]
     yield from reasons_against(context, found, rivals)
-    if not all(beats(found.found.after, rival) for rival in rivals):
+    if not all(leaves_far_less(found.found.after, rival) for rival in rivals):
         yield "what the catalogue names leaves hardly more"
 
 

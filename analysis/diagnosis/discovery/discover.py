@@ -83,13 +83,15 @@ def discover(
     alone: bool = False,
 ) -> Discovery | None:
     """The laws found, at most `most`, fitted by output error; None where none is worth its parameters. known: what the
-    named effects explain. alone: only laws that are likely to explain all; given up as soon as they are seen not to."""
+    named effects explain. alone: only laws of single terms that are likely to explain all; given up where a screen or
+    a fit shows that they do not, unless a law of the same kind may act on another axis."""
     context = replace(context, map_=limit_map(context.map_, time_left))
     retuned = known.retuned.fitted
     base = context.candidate(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
     rounds: list[Round] = []
     steps: list[FittedCandidate] = []
-    while len(rounds) < most and time_left() and base.score.worst_channel > NOISE_ALONE:
+    enough = EXPLAINED_ERROR if alone else NOISE_ALONE
+    while len(rounds) < most and time_left() and base.score.worst_channel > enough:
         progress("looking for a law that has no name", 0.6 + 0.1 * len(rounds))
         found = _find_next_law(context, base.fitted, time_left, alone)
         if found is None or not is_worthwhile(base, found.fitted_candidates[0]):
@@ -99,7 +101,8 @@ def discover(
         base = found.fitted_candidates[0]
         rounds.append(found)
         steps.append(base)
-        if alone and base.score.worst_channel > EXPLAINED_ERROR and not _has_counterpart(found.sums[0]):
+        open_ = found.sums[0].partner is None and depends_on_another_axis(found.sums[0])
+        if alone and base.score.worst_channel > enough and not open_:
             return None
     if not rounds:
         return None
@@ -116,9 +119,10 @@ def discover(
     return Discovery(whole, tuple(rounds))
 
 
-def _has_counterpart(of: Sum) -> bool:
-    """Whether a law depends on the motion of another axis, on which a law of the same kind may act."""
-    return any(name[-1:] in AXES and name[-1:] != AXES[of.axis] for name in of.variables)
+def depends_on_another_axis(of: Sum) -> bool:
+    """Whether a sum depends on the motion or the command of another axis than its own."""
+    names = {name for term in of.terms for name in term.variables}
+    return any(name[-1:] in AXES and name[-1:] != AXES[of.axis] for name in names)
 
 
 def _first_half(context: SearchContext, pair: FittedCandidate) -> FittedCandidate:
@@ -139,7 +143,7 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget, 
         reverse=True,
     )
     chosen = _choose_sums_to_fit(_keep_close_to_best(_best_of_each_structure(every)))
-    if alone and chosen and chosen[0].cross_validated - 1 > LAW_ALONE_LEAVES * (chosen[0].without - 1):
+    if alone and chosen and not _may_explain_alone(chosen[0]):
         return None
     pairs = fit_sums(context, base, chosen, time_left)
     if not pairs:
@@ -150,6 +154,12 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget, 
     own = [(each.acts_on, each.axis) for each in (first, first.partner) if each is not None]
     placebo = max((found.placebo for view, found in searched if (view.acts_on, view.axis) in own), default=0.0)
     return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo, time_left())
+
+
+def _may_explain_alone(best: Sum) -> bool:
+    """Whether the screen leaves so little of the missing force, with a single term, that a fit is worth its time."""
+    left = best.cross_validated - 1 <= LAW_ALONE_LEAVES * (best.without - 1)
+    return left and len(best.terms) == 1
 
 
 def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:

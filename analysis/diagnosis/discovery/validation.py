@@ -20,9 +20,9 @@ from analysis.diagnosis.discovery.snap_exponents import snap_exponents
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import excess, inseparable
+from analysis.diagnosis.search.parsimony import inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.settings import LAW_BEATS, LAW_PLACEBO, LAW_SAME, LAW_STABLE, LOUDER, NOISE_KNOWN_TO
+from analysis.diagnosis.settings import LAW_PLACEBO, LAW_SAME, LAW_STABLE, LOUDER, NOISE_KNOWN_TO
 from analysis.wording import conjoin
 from equalizer.effects.discovered_law import axis_names
 from equalizer.signals.recording import Segment
@@ -154,16 +154,6 @@ def _predict_the_same(without: FittedCandidate, law: FittedCandidate, other: Fit
         apart += float(np.nansum((of_law - of_other) ** 2))
         added += float(np.nansum((of_law - base) ** 2))
     return apart <= LAW_SAME**2 * added
-
-
-def beats(law: FittedCandidate, rival: FittedCandidate) -> bool:
-    """Whether a law's excess error is so far below a named effect's that it replaces the name, and its error on
-    held-out samples is lower by more than the noise is known to: the same formula under a name of its own is no better.
-    Both with held-out errors."""
-    held_out, other = (float(np.mean(np.log(each.score.test))) for each in (law, rival))
-    if np.isfinite(held_out) and held_out >= other - NOISE_KNOWN_TO:
-        return False
-    return excess(law) <= LAW_BEATS * excess(rival)
 
 
 def does_as_well_with_less(context: SearchContext, of: Discovery, rival: FittedCandidate) -> bool:

@@ -146,13 +146,14 @@ def add_effects(
     while open_ended and len(steps) < most and is_worth_searching(context, found, base):
         step = Step(f"looking for the {_ORDINALS[len(steps)]} effect", 0.1 + 0.3 * len(steps), progress)
         try:
-            if len(rounds) > len(steps):
+            resumed = len(rounds) > len(steps)
+            if resumed:
                 tried = named = rounds[-1]
             else:
                 tried = find_next_effect(within_time, catalogue, base.fitted, step)
                 named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
                 rounds.append(named)
-            free = named[:1] == tried[:1] and len(rounds) < most
+            free = named[:1] == tried[:1] and len(rounds) < most and not (resumed and context.barred)
             both = _look_ahead(within_time, catalogue, base, named, step) if free else ()
         except OutOfTimeError:
             ended_early = True

@@ -12,6 +12,7 @@ from analysis.diagnosis.settings import (
     ADDED_SHARE,
     AS_GOOD_GAIN,
     AS_GOOD_SHARE,
+    LAW_BEATS,
     NOISE_ALONE,
     NOISE_KNOWN_TO,
     REFINED_FRICTION_SHARE,
@@ -115,3 +116,13 @@ def _good_enough(plain: FittedCandidate, refined: FittedCandidate) -> bool:
     rubs = plain.newest in DRY_FRICTION
     share = REFINED_FRICTION_SHARE if rubs else REFINED_SHARE
     return gained <= max(REFINED_GAIN, min(share * excess(plain), REFINED_MOST_GAIN))
+
+
+def leaves_far_less(candidate: FittedCandidate, rival: FittedCandidate) -> bool:
+    """Whether a law's excess error is so far below a named effect's that it replaces the name, and its error on
+    held-out samples is lower by more than the noise is known to: the same formula under a name of its own is no better.
+    Both with held-out errors on the same samples."""
+    held_out, other = (float(np.mean(np.log(each.score.test))) for each in (candidate, rival))
+    if np.isfinite(held_out) and held_out >= other - NOISE_KNOWN_TO:
+        return False
+    return excess(candidate) <= LAW_BEATS * excess(rival)

@@ -2,7 +2,7 @@
 
 Theory of operation.
 
-1. `explain` selects effects forward, on the samples to fit and to choose by.
+1. `add_effects` selects effects forward, on the samples to fit and to choose by.
 2. Backward elimination (`prune`) removes what selection added and the result does not need: the earlier of two effects,
    where the later alone fits as well; effects that take too little of the mismatch; effects whose parameters the data
    do not determine (`identifiability`: the interval of the only amplitude, or its profile likelihood, contains zero).
@@ -11,9 +11,9 @@ Theory of operation.
 4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), the
    search is repeated with a part of them opened: all but the loudest segments, else the first half of each stretch.
    What it finds must be confirmed by the part that is still held out.
-5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`). A law that
-   alone explains what the first effect leaves is a shorter description than two effects: it is asked for before the
-   second one is looked for.
+5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`): before a second
+   effect is looked for, as a law that alone explains is a shorter description than two effects, and at the end. A law
+   that was found early and leaves a part is kept where the rest of the search names nothing.
 
 Reference recordings of the intact device are used in `reference/search_with_reference`, not here.
 
@@ -33,7 +33,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, begin, explain, is_worth_searching
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
-from analysis.diagnosis.search.parsimony import is_worthwhile
+from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_far_less
 from analysis.diagnosis.search.revise_selection import exchange_effects, without_effect
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, shows_there_alone
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
@@ -45,7 +45,7 @@ from analysis.diagnosis.search.verdict import (
     shares_taken,
     worth_naming,
 )
-from analysis.diagnosis.settings import LAST_EFFECT_SHARE
+from analysis.diagnosis.settings import EXPLAINED_ERROR, LAST_EFFECT_SHARE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
@@ -142,9 +142,9 @@ class Beyond:
     """What is tried where the catalogue leaves a mismatch. Each returns the search with what it names in place of the
     catalogue's effects, or with candidates, or unchanged."""
 
-    short: Callable[[SearchResult], SearchResult] = lambda seen: seen
+    before_pairs: Callable[[SearchResult], SearchResult] = lambda seen: seen
     """Before a second effect is looked for: names only what is a shorter description than two effects."""
-    any: Callable[[SearchResult], SearchResult] = lambda seen: seen
+    at_end: Callable[[SearchResult], SearchResult] = lambda seen: seen
     """After the last effect, with and without the part of the held-out samples that is opened where only they show the
     mismatch."""
 
@@ -157,16 +157,27 @@ def search_effects(
     beyond: Beyond = Beyond(),
 ) -> SearchResult:
     """The search for effects with its verdict."""
-    beyond = Beyond(_guarded(beyond.short), _guarded(beyond.any))
+    beyond = Beyond(_guarded(beyond.before_pairs), _guarded(beyond.at_end))
     alone = add_effects(context, catalogue, begin(context, progress), progress, time_left, most=1)
     early = SearchResult(context, alone, Judgement("unexplained", False))
-    if is_worth_searching(context, alone, alone.after):
-        early = beyond.short(early)
-    if early.judgement.verdict == "explained":
+    if is_worth_searching(context, alone, alone.after) and judge(alone).verdict != "explained":
+        early = beyond.before_pairs(early)
+    explains = early.judgement.verdict == "explained"
+    if explains and early.found.after.score.worst_channel <= EXPLAINED_ERROR:
         return early
-    result = _search_with_pairs(early, alone, catalogue, progress, time_left, beyond.any)
-    # A law that leaves a part is kept for where names leave more, or where the time ended over them.
-    return early if early.judgement.named and not _is_better(result, early) else result
+    result = _search_with_pairs(context, alone, catalogue, progress, time_left, beyond.at_end)
+    return _keep_early(early, result)
+
+
+def _keep_early(early: SearchResult, result: SearchResult) -> SearchResult:
+    """The result of the whole search; the law that was found before it where nothing is named, or where the time ended
+    before that law was weighed and what is named leaves far more."""
+    ended = result.found.ended_early
+    if not early.judgement.named:
+        return replace(result, unconfirmed=(*early.unconfirmed, *result.unconfirmed)) if ended else result
+    if result.judgement.named and not (ended and leaves_far_less(early.found.after, result.found.after)):
+        return result
+    return replace(early, remarks=(OUT_OF_TIME, *early.remarks)) if ended else early
 
 
 def _guarded(add: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
@@ -174,16 +185,8 @@ def _guarded(add: Callable[[SearchResult], SearchResult]) -> Callable[[SearchRes
     return lambda seen: seen.context.guard.part(LAW_BEYOND, "its search", lambda: add(seen), seen)
 
 
-def _is_better(result: SearchResult, early: SearchResult) -> bool:
-    """Whether a result is named and explains more than an early one, on held-out samples."""
-    if result.judgement.verdict == "explained" or not result.judgement.named:
-        return result.judgement.named
-    left, before = (np.mean(np.log(each.found.after.score.test)) for each in (result, early))
-    return bool(not left > before)
-
-
 def _search_with_pairs(
-    early: SearchResult,
+    context: SearchContext,
     alone: Explanation,
     catalogue: Sequence[Effect],
     progress: Progress,
@@ -191,7 +194,6 @@ def _search_with_pairs(
     beyond: Callable[[SearchResult], SearchResult],
 ) -> SearchResult:
     """The search that goes on from a first effect, where that leaves enough. alone: the explanation by it."""
-    context = early.context
     found = add_effects(context, catalogue, alone, progress, time_left)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     judged = _judge_with_prediction(context, found)

@@ -1,5 +1,7 @@
 """A hub that turns a beam, whose deflection is measured with noise: laws of the hub show in the band of the hub."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -89,11 +91,50 @@ def test_where_no_law_is_named_the_linear_numbers_that_leave_less_of_the_forces_
     assert left[1] < 0.3 * left[0]
 
 
+def test_a_given_model_that_leaves_less_stays(recording_of, balance_of):
+    """One body under a broad force: the true model's error is the noise, and the balance's numbers are fitted."""
+    rng = np.random.default_rng(5)
+    recording, mass = driven_body(recording_of, rng)
+    true = MechanicalModel("true", "position", *(np.array([[value]]) for value in mass), np.eye(1), np.eye(1))
+    given = choose_fitting_measure([recording], true, (), "force")
+    wrong = choose_fitting_measure([recording], replace(true, mass=3 * true.mass), (), "force")
+    balances = balance_of(recording)
+    left = [rms_of_forces(choose_plain_forces([recording], each, balances)) for each in (given, wrong)]
+    assert left[0] <= rms_of_forces(given)
+    assert left[1] < 0.5 * rms_of_forces(wrong)
+
+
+@pytest.mark.parametrize("offset", [0.0, 2.0])
+def test_a_constant_force_does_not_decide_which_is_taken(recorded, balance_of, offset):
+    recording = recorded(0.0)
+    command = replace(recording.command, samples=recording.command.samples + offset)
+    moved = replace(recording, command=command)
+    given = choose_fitting_measure([moved], hub_and_beam(5 * HUB), (), "force", about_mean=True)
+    plain = choose_plain_forces([moved], given, balance_of(moved))
+    assert BALANCE_LEAVES_LESS in plain.chosen.remarks
+    assert plain.is_reduced
+    assert rms_of_forces(plain) < 0.3 * rms_of_forces(given)
+
+
 def test_with_a_named_law_or_without_balances_the_model_stays(recorded, balance_of):
     recording = recorded(FRICTION)
     given = choose_fitting_measure([recording], hub_and_beam(5 * HUB), (), "force", about_mean=True)
     assert choose_plain_forces([recording], given, balance_of(recording)) is given
     assert choose_plain_forces([recording], given, ()) is given
+
+
+def driven_body(recording_of, rng):
+    """Recording, and mass, damping and stiffness."""
+    mass, damping, spring = 0.1, 2.0, 400.0
+    force = np.convolve(rng.standard_normal(4000), np.hanning(20), "same")
+    place, speed, found = 0.0, 0.0, []
+    for push in force:
+        found.append(place)
+        for _ in range(10):
+            speed += (push - damping * speed - spring * place) / mass / RATE_HZ / 10
+            place += speed / RATE_HZ / 10
+    noisy = np.array(found) + 1e-6 * rng.standard_normal(len(found))
+    return recording_of(force[:, None], noisy[:, None], RATE_HZ), (mass, damping, spring)
 
 
 def rms_of_forces(fitting):

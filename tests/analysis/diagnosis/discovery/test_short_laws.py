@@ -1,11 +1,19 @@
 """A short law is asked for before a second effect; two effects are not replaced by a sum of terms. Compiles."""
 
+from dataclasses import replace
+
 import pytest
 
-from analysis.diagnosis.discovery.add_laws import LawSearch
+import analysis.diagnosis.discovery.discover as discover_module
+from analysis.diagnosis.discovery.add_laws import LawSearch, is_short
+from analysis.diagnosis.discovery.discover import Discovery, Round
+from analysis.diagnosis.discovery.fit_sum import Sum
+from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.law_of_sum import laws_of
+from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.search import Beyond, SearchResult, search_effects
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME
+from analysis.diagnosis.search.verdict import Judgement, judge
 from equalizer.effects.catalogue import EFFECTS
 from tests.lawful import arena_of, law, recorded
 
@@ -45,7 +53,7 @@ def test_a_law_that_explains_ends_the_search_before_a_second_effect(seed=11):
 
 
 def test_two_effects_keep_their_names(seed=12):
-    """A sum of both terms is found before them, and is no shorter."""
+    """Laws are asked for before the second; a sum of both terms would be no shorter."""
     result, said = searched(recorded((CUBE, DRAG_2), seed))
     assert names_of(result) == {"hardening_stiffness", "quadratic_damping"}
     assert result.judgement.verdict == "explained"
@@ -79,8 +87,75 @@ def test_out_of_time_over_a_pair_the_law_that_leaves_a_part_is_kept(hears, seed=
     def short(result):
         asked.append("short")
         found = LawSearch(lambda what, share: None, always).add_short(result)
-        named = type(found.judgement)("partly_explained", True)
+        named = Judgement("partly_explained", True)
         return SearchResult(context, found.found, named) if hears else result
 
     result = search_effects(context, CATALOGUE, lambda what, share: None, lambda: not asked, Beyond(short))
     assert ("discovered_law" in names_of(result)) == hears
+    assert OUT_OF_TIME in result.remarks
+
+
+def test_a_law_that_leaves_a_part_gives_way_to_names_that_explain(seed=12):
+    """Of a device with two effects, an early answer that holds the first one alone is not kept."""
+    context, _ = arena_of(recorded((CUBE, DRAG_2), seed))
+
+    def short(result):
+        return replace(result, judgement=Judgement("partly_explained", True))
+
+    result = search_effects(context, CATALOGUE, lambda what, share: None, always, Beyond(short))
+    assert names_of(result) == {"hardening_stiffness", "quadratic_damping"}
+
+
+def test_a_short_law_is_found_once_for_both_questions(seed=11):
+    said: list[str] = []
+    context, known = arena_of(recorded((DRAG_15,), seed))
+    laws = LawSearch(lambda what, share: said.append(what), always)
+    result = SearchResult(context, known, judge(known))
+    assert laws.add_short(result).judgement.verdict == laws.add_any(result).judgement.verdict == "explained"
+    assert said.count("looking for a law that has no name") == 1
+
+
+def test_a_screen_that_leaves_too_much_costs_no_fit(monkeypatch, seed=12):
+    """Of two effects the best single term leaves more than a twentieth."""
+    monkeypatch.setattr(discover_module, "fit_sums", lambda *arguments: pytest.fail("a fit was begun"))
+    context, known = arena_of(recorded((CUBE, law("-p0*abs(vx)*vx", 6.0)), seed))
+    assert discover_module.discover(context, known, lambda what, share: None, always, alone=True) is None
+
+
+def of_sums(*sums):
+    return Discovery(None, tuple(Round((), (each,), 0.0) for each in sums))
+
+
+def sum_of(axis, *shapes, partner=None):
+    terms = tuple(Term(shape) for shape in shapes)
+    return Sum(axis, terms, (1.0,) * len(terms), 1.0, 9.0, 0.0, (), partner=partner)
+
+
+@pytest.mark.parametrize(
+    ("sums", "short"),
+    [
+        ((sum_of(0, "abs(vx)*vx"),), True),
+        ((sum_of(0, "abs(vx)*vx", "x**3"),), False),
+        ((sum_of(0, "sqrt(vx**2 + vy**2)*vx"), sum_of(1, "sqrt(vx**2 + vy**2)*vy")), True),
+        ((sum_of(0, "abs(vx)*vx"), sum_of(1, "abs(vy)*vy")), False),
+        ((sum_of(0, "vx*sin(t)"), sum_of(1, "vy*sin(t)")), False),
+        ((sum_of(0, "vy", partner=sum_of(1, "vx")),), True),
+        ((sum_of(0, "vx*y"), sum_of(0, "x*vy")), False),
+    ],
+)
+def test_short_is_one_term_or_one_on_each_axis_that_depends_on_another(sums, short):
+    assert is_short(of_sums(*sums)) is short
+
+
+def test_a_law_search_that_crashes_keeps_what_the_catalogue_names(seed=12):
+    def crashes(result):
+        raise ValueError("operands could not be broadcast together")
+
+    context, _ = arena_of(recorded((CUBE, DRAG_2), seed))
+    guarded = replace(context, guard=Guard(on=True))
+    result = search_effects(guarded, CATALOGUE, lambda what, share: None, always, Beyond(crashes, crashes))
+    assert names_of(result) == {"hardening_stiffness", "quadratic_damping"}
+    (said,) = guarded.guard.sentences
+    assert said.startswith("A law outside the catalogue was left out")
+    with pytest.raises(ValueError, match="broadcast"):
+        search_effects(context, CATALOGUE, lambda what, share: None, always, Beyond(crashes))
