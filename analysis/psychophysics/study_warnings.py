@@ -194,8 +194,8 @@ def _drift_warning(trials: Iterable[Trial]) -> str:
     if not drifting:
         return ""
     return (
-        f"A bias towards one of the two answers changed from run to run of a session (p < {DRIFT_LEVEL:g} each), which "
-        f"raises thresholds where it was strong: {conjoin(drifting)}."
+        f"A bias towards one of the two answers changed from run to run of a session (p < {DRIFT_LEVEL:g} each, where "
+        f"only chance differs between runs), which raises thresholds where it was strong: {conjoin(drifting)}."
     )
 
 

@@ -155,8 +155,9 @@ def direction_limit(
     half = student.ppf(0.5 + confidence / 2, n - 1) * lines.std(axis=0, ddof=1) / math.sqrt(n)
     crossings = np.flatnonzero((middle[:-1] < cap_db) & (middle[1:] >= cap_db))
     may_be = (middle - half <= cap_db) & (middle + half >= cap_db)
-    # The frequencies of the grid may all miss an interval that is narrower than their distance.
-    may_be[crossings] = True
+    # The frequencies of the grid may all miss an interval that is narrower than their distance: the limit lies between
+    # that before the crossing and the next.
+    may_be[crossings] = may_be[crossings + 1] = True
     possible = np.flatnonzero(may_be)
     lower = float(grid[possible[0]]) if len(possible) and possible[0] > 0 else None
     upper = float(grid[possible[-1]]) if len(possible) and possible[-1] < len(grid) - 1 else None

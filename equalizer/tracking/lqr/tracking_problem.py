@@ -120,11 +120,9 @@ class TrackingProblem:
 def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> TrackingProblem:
     """Problem of a model and its weights, augmented by the low-passed forces as outputs where those are penalised.
 
-    Raises TrackingError for a model without states and for an output weight of another size.
+    Raises TrackingError for an output weight of another size.
     """
     p, m = model.D.shape
-    if not model.order:
-        raise TrackingError("the model has no states: its answer is a constant gain, which needs no controller")
     Q = np.eye(p) if weights.output_weight is None else weights.output_weight
     if Q.shape != (p, p):
         raise TrackingError(f"output_weight has shape {Q.shape}; {p} outputs need ({p}, {p})")

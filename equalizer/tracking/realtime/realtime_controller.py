@@ -79,9 +79,11 @@ def realtime_controller(
     """Make both controllers. transient: (N, p), m/s², before it is rotated; None = a tap along the last output. Samples
     in which the device comes to rest are appended.
 
-    Raises TrackingError for a model without stationary gains and for settings that no loop can run.
+    Raises TrackingError for a model without states or without stationary gains, and for settings that no loop can run.
     """
     settings = settings or RealtimeSettings()
+    if not model.order:
+        raise TrackingError("the model has no states: its answer is a constant gain, which needs no controller")
     problem = make_tracking_problem(model, TrackingWeights(settings.weight))
     wanted = tap(model) if transient is None else transient
     _, after = CAUSAL.samples(model.sample_rate_hz)

@@ -155,7 +155,10 @@ class PacketParser:
             comes_next = last is not None and _comes_next(last, found.packet, self._period_us).all()
             if not comes_next and (at < self._used or _is_repeat(last, found.packet)):
                 continue
-            counting = [found] if comes_next else self._chain_to(found, 1 if last is None else CONFIRMED_BY)
+            if comes_next:
+                counting = [*self._between(last, found), found]
+            else:
+                counting = self._chain_to(found, 1 if last is None else CONFIRMED_BY)
             if not counting:
                 self._doubtful = [*self._doubtful[1 - MOST_DOUBTFUL :], found]
                 continue
@@ -167,6 +170,19 @@ class PacketParser:
                 self._used = each.at + SIZE
             self._doubtful = []
         return np.concatenate(chosen), np.array(anew, dtype=np.int64)
+
+    def _between(self, last: Packets | None, found: _Found) -> list[_Found]:
+        """The doubtful packets whose bytes, numbers and times lie between the last one that counts and this one: the
+        board stamped or sent them late."""
+        between, used = [found][:0], self._used
+        for doubtful in self._doubtful:
+            inside = doubtful.at >= used and doubtful.at + SIZE <= found.at
+            if last is None or not inside or not _follows(last, doubtful.packet).all():
+                continue
+            if _follows(doubtful.packet, found.packet).all():
+                between.append(doubtful)
+                last, used = doubtful.packet, doubtful.at + SIZE
+        return between
 
     def _chain_to(self, found: _Found, before: int) -> list[_Found]:
         """So many doubtful packets, each followed by the next and the last by this one, and itself; or none."""

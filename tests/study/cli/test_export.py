@@ -97,7 +97,10 @@ def test_what_was_left_out_before_an_export_is_counted_after_it_without_a_name(d
 def test_a_count_that_is_none_is_not_believed(data, tmp_path, count):
     assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", "csv"]) == 0
     facts = tmp_path / "ds" / "facts.json"
-    facts.write_text(facts.read_text("utf-8").replace('"left_out_count": 0', f'"left_out_count": {count}'), "utf-8")
+    written = facts.read_text("utf-8")
+    changed = written.replace('"left_out_count": 0', f'"left_out_count": {count}')
+    assert changed != written
+    facts.write_text(changed, "utf-8")
     assert collect_exported(tmp_path / "ds").left_out == ()
 
 

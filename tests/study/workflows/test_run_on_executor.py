@@ -72,4 +72,4 @@ def test_a_killed_worker_is_an_error_that_says_what_is_kept_and_what_to_do():
     with told, worker_processes(1) as pool:
         for key, _ in finished_pieces(pool, killed, ((number, (number,)) for number in range(6))):
             came.append(key)
-    assert came == [0, 1, 2]
+    assert sorted(came) == [0, 1, 2]

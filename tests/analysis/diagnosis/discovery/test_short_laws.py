@@ -14,6 +14,7 @@ from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.search import Beyond, SearchResult, search_effects
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import Judgement, judge
+from analysis.diagnosis.settings import LAW_ALONE_LEAVES
 from equalizer.effects.catalogue import EFFECTS
 from tests.lawful import arena_of, law, recorded
 
@@ -115,11 +116,20 @@ def test_a_short_law_is_found_once_for_both_questions(seed=11):
     assert said.count("looking for a law that has no name") == 1
 
 
-def test_a_screen_that_leaves_too_much_costs_no_fit(monkeypatch, seed=12):
-    """Of two effects the best single term leaves more than a twentieth."""
-    monkeypatch.setattr(discover_module, "fit_sums", lambda *arguments: pytest.fail("a fit was begun"))
-    context, known = arena_of(recorded((CUBE, law("-p0*abs(vx)*vx", 6.0)), seed))
+@pytest.mark.parametrize(("leaves", "begun"), [(1e-4, False), (LAW_ALONE_LEAVES, True)])
+def test_a_screen_that_leaves_too_much_costs_no_fit(monkeypatch, leaves, begun, seed=12):
+    """Of two effects, a single term leaves a part of the missing force."""
+    fits: list[object] = []
+
+    def fit_sums(*arguments):
+        fits.append(arguments)
+        return ()
+
+    monkeypatch.setattr(discover_module, "LAW_ALONE_LEAVES", leaves)
+    monkeypatch.setattr(discover_module, "fit_sums", fit_sums)
+    context, known = arena_of(recorded((CUBE, DRAG_2), seed))
     assert discover_module.discover(context, known, lambda what, share: None, always, alone=True) is None
+    assert bool(fits) == begun
 
 
 def of_sums(*sums):

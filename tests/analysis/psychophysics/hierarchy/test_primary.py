@@ -142,6 +142,7 @@ def test_a_median_that_falls_below_the_cap_again_is_told_beside_the_limit():
 def test_an_interval_narrower_than_the_grid_still_holds_the_limit():
     pseudo = np.array([-8.0, -4.0, 0.0, 8.0, 12.0]) + 1e-9 * np.arange(10)[:, None]
     found = direction_limit(HZ, pseudo, 10.0, 0.95)
+    assert found.lower_hz <= found.frequency_hz <= found.upper_hz
     assert found.lower_hz == pytest.approx(found.frequency_hz, rel=0.002)
     assert found.upper_hz == pytest.approx(found.frequency_hz, rel=0.002)
 

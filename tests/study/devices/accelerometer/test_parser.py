@@ -205,6 +205,22 @@ def test_a_packet_that_lost_its_last_bytes_does_not_hide_the_next_that_begins_wi
         assert (parser.counts.packets, parser.counts.spoiled_bytes, parser.counts.lost) == (4, 0, 0)
 
 
+@pytest.mark.parametrize("late_us", [75, 250, 750])
+def test_packets_that_were_stamped_late_count(late_us):
+    """Of two in a hundred by 0.3 to 3 periods, and the following ones as far as the board has to catch up."""
+    rng = np.random.default_rng(late_us)
+    numbers = np.arange(5000)
+    due = 250 * numbers
+    times = due + late_us * (rng.random(len(numbers)) < 0.02)
+    for k in range(1, len(times)):
+        times[k] = max(times[k], times[k - 1] + 60)
+    data = encode_packets(numbers, times, rng.integers(0, 2**16, (len(numbers), 3), dtype=np.uint16))
+    parser = PacketParser()
+    samples = [parser.feed(data[at : at + 200]) for at in range(0, len(data), 200)]
+    assert np.concatenate([each.sequence for each in samples]).tolist() == numbers.tolist()
+    assert (parser.counts.lost, parser.counts.spoiled_bytes, parser.counts.restarts) == (0, 0, 0)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_packets_that_come_again_or_lie_are_told_apart_among_garbled_ones(seed):
     """Repeats, old ones sent again, ones from the near future and from anywhere, two in a row as well."""
