@@ -68,8 +68,8 @@ def search_by_simulation(
     if balances:
         named = any(balance.named for balance in balances)
         # From commands without the force of other motions no effect of the actuator can be told.
-        imposed = fitting.is_reduced or bool(recordings[0].meta.get("imposed"))
-        catalogue = [] if named else [e for e in catalogue if _unseen_by_balance(e.name, place_of_effect(e), imposed)]
+        driven = not fitting.is_reduced and not recordings[0].meta.get("imposed")
+        catalogue = [] if named else [e for e in catalogue if _unseen_by_balance(e.name, place_of_effect(e), driven)]
         may_be_named = []
     if settings.clean:
         observable = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
@@ -158,11 +158,11 @@ def _catalogue(settings: DiagnosisSettings, recording: Recording, barred: frozen
     return catalogue + [effect for effect in CATALOGUE if effect.name in refined & barred]
 
 
-def _unseen_by_balance(name: str, place: str, imposed: bool) -> bool:
-    """Whether a force balance cannot observe an effect of the actuator or sensor. Where a motion is imposed, no
-    actuator drives it."""
-    driven = not imposed and name != "body_on_actuator" and name not in TESTED_BY_BALANCE
-    return place == "sensor" or (place == "actuator" and driven)
+def _unseen_by_balance(name: str, place: str, driven: bool) -> bool:
+    """Whether a force balance cannot observe an effect of the actuator or sensor. driven: by an actuator with the
+    commands as they are; no actuator drives an imposed motion."""
+    untested = name != "body_on_actuator" and name not in TESTED_BY_BALANCE
+    return place == "sensor" or (place == "actuator" and driven and untested)
 
 
 def hums_low(found: Explanation) -> bool:

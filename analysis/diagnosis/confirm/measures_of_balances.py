@@ -17,8 +17,8 @@ from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelErr
 from equalizer.signals.recording import Recording
 
 BALANCE_LEAVES_LESS = (
-    "Forces are predicted with the linear parameters of the force balance: they leave less of the forces than the "
-    "model that was fitted to spectra."
+    "Forces are predicted with the linear parameters of the force balance and a constant: they leave less of the "
+    "forces than the model that was fitted to spectra."
 )
 
 
@@ -39,8 +39,7 @@ def list_fitting_measures(
     if compared == "motion":
         return
     try:
-        reduced = reduce_recordings(recordings, balances) if is_reduced(balances) else recordings
-        rigid = first_model(balances, reduced[0], model.name)
+        reduced, rigid = _model_of_balances(recordings, balances, model.name)
         if rigid is not None:
             narrow = measure_by_force(reduced, rigid, None)
             held = share_within(balances, narrow.measure.band_hz) if isinstance(narrow.measure, PredictedForce) else 0.0
@@ -66,19 +65,26 @@ def choose_plain_forces(
     if not isinstance(measure, PredictedForce):
         return fitting
     try:
-        reduced = is_reduced(balances)
-        used = reduce_recordings(recordings, balances) if reduced else tuple(recordings)
-        plain = first_model(balances, used[0], fitting.model.name)
+        reduced, plain = _model_of_balances(recordings, balances, fitting.model.name)
         if plain is None:
             return fitting
-        chosen = _predict_about_mean(used, plain, measure.band_hz)
+        chosen = _predict_about_mean(reduced, plain, measure.band_hz)
     except (MechanicalModelError, np.linalg.LinAlgError):
         return fitting
     other = chosen.measure
     if not isinstance(other, PredictedForce) or not _leaves_less((plain, other), (fitting.model, measure)):
         return fitting
     remarks = tuple(remark for remark in fitting.chosen.remarks if remark != ABOUT_MEAN)
-    return FittingMeasure(plain, replace(chosen, remarks=(*remarks, BALANCE_LEAVES_LESS)), is_reduced=reduced)
+    chosen = replace(chosen, remarks=(*remarks, BALANCE_LEAVES_LESS))
+    return FittingMeasure(plain, chosen, is_reduced=is_reduced(balances))
+
+
+def _model_of_balances(
+    recordings: Sequence[Recording], balances: Sequence[Balance], name: str
+) -> tuple[Sequence[Recording], MechanicalModel | None]:
+    """The recordings with one body per command, and the balances' linear model of it; None where there is none."""
+    reduced = reduce_recordings(recordings, balances) if is_reduced(balances) else recordings
+    return reduced, first_model(balances, reduced[0], name)
 
 
 def _predict_about_mean(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float) -> MeasureChoice:

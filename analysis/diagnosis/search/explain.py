@@ -165,8 +165,8 @@ def add_effects(
         steps += [each[0] for each in both or (named,)]
         base = steps[-1]
     after = found.after if len(steps) == len(found.steps) else context.with_test_score(base)
-    found = replace(found, after=after, rounds=tuple(rounds), steps=tuple(steps))
-    return replace(found, ended_early=ended_early, barred=barred or found.barred)
+    barred = barred or found.barred
+    return replace(found, after=after, rounds=tuple(rounds), steps=tuple(steps), ended_early=ended_early, barred=barred)
 
 
 def _evaluate_again(context: SearchContext, scored: FittedCandidate) -> Fitted:

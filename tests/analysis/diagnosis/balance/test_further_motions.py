@@ -10,6 +10,7 @@ from analysis.diagnosis.balance.motion import motion_band_hz, motions_of
 from analysis.diagnosis.confirm.fitting_measures import choose_fitting_measure
 from analysis.diagnosis.confirm.measures_of_balances import BALANCE_LEAVES_LESS, choose_plain_forces
 from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.search_by_simulation import _unseen_by_balance
 from equalizer.plant.mechanical_model import MechanicalModel
 
 RATE_HZ, SECONDS, FINE = 500.0, 5.0, 20
@@ -114,6 +115,19 @@ def test_a_constant_force_does_not_decide_which_is_taken(recorded, balance_of, o
     assert BALANCE_LEAVES_LESS in plain.chosen.remarks
     assert plain.is_reduced
     assert rms_of_forces(plain) < 0.3 * rms_of_forces(given)
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "driven", "tried"),
+    [
+        ("amplifier_lag", "actuator", True, True),
+        ("amplifier_lag", "actuator", False, False),
+        ("force_deadband", "actuator", True, False),
+        ("sensor_offset", "sensor", False, True),
+    ],
+)
+def test_effects_of_the_actuator_are_tried_on_the_commands_as_they_are_alone(name, place, driven, tried):
+    assert _unseen_by_balance(name, place, driven) is tried
 
 
 def test_with_a_named_law_or_without_balances_the_model_stays(recorded, balance_of):
