@@ -47,8 +47,19 @@ def _without(context: SearchContext, candidate: FittedCandidate, number: int) ->
 def exchange_effects(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
-    """The explanation with effects exchanged; unchanged where it reaches the noise, has a single effect, or nothing
-    fits better."""
+    """The explanation with effects exchanged; unchanged where it reaches the noise, has a single effect, nothing fits
+    better, or a law crashes."""
+    newest = found.steps[-1].newest if found.steps else ""
+
+    def exchange() -> Explanation:
+        return _exchange_each(context, found, catalogue, progress, time_left)
+
+    return context.guard.part(newest, "its exchange", exchange, found)
+
+
+def _exchange_each(
+    context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> Explanation:
     limited = replace(context, map_=limit_map(context.map_, time_left))
     fixed = context.certain or context.references is not None or found.ended_early or found.barred
     for _ in found.steps:
@@ -59,6 +70,16 @@ def exchange_effects(
             break
         found = better
     return found
+
+
+def exchange_for_refinement(
+    context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> Explanation:
+    """The explanation with its first effect exchanged for a refinement of the same law at the same place: what this
+    adds may be seen only beside the second effect, and is far fewer fits than the whole catalogue."""
+    first = found.steps[0].newest if found.steps else ""
+    refinements = [effect for effect in catalogue if first in effect.simpler]
+    return exchange_effects(context, found, refinements, progress, time_left) if refinements else found
 
 
 def _exchange_first(

@@ -34,7 +34,7 @@ from analysis.diagnosis.search.explain import Explanation, add_effects, begin, e
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
 from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_far_less
-from analysis.diagnosis.search.revise_selection import exchange_effects, without_effect
+from analysis.diagnosis.search.revise_selection import exchange_effects, exchange_for_refinement, without_effect
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, shows_there_alone
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
@@ -194,7 +194,9 @@ def _search_with_pairs(
     beyond: Callable[[SearchResult], SearchResult],
 ) -> SearchResult:
     """The search that goes on from a first effect, where that leaves enough. alone: the explanation by it."""
-    found = add_effects(context, catalogue, alone, progress, time_left)
+    found = add_effects(context, catalogue, alone, progress, time_left, most=2)
+    found = exchange_for_refinement(context, found, catalogue, progress, time_left)
+    found = add_effects(context, catalogue, found, progress, time_left)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     judged = _judge_with_prediction(context, found)
     first = SearchResult(context, found, judged, _remarks(found))
@@ -269,12 +271,8 @@ def _exchange_and_prune(
 ) -> Explanation:
     """Exchange and backward elimination after forward selection; where they crash, nothing is named."""
     nothing = replace(found, after=found.retuned, steps=())
+    exchanged = exchange_effects(context, found, catalogue, progress, time_left)
     newest = found.steps[-1].newest if found.steps else ""
-
-    def exchange() -> Explanation:
-        return exchange_effects(context, found, catalogue, progress, time_left)
-
-    exchanged = context.guard.part(newest, "its exchange", exchange, found)
     return context.guard.part(newest, "its last look", lambda: prune(context, exchanged, time_left), nothing)
 
 
