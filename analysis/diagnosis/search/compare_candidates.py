@@ -160,7 +160,7 @@ def refine_with_sensitivity(
     found = _fit_whole(context, start, known if short_form is None else short_form.repeat_sensitivity(known))
     # What one period leaves open may run away on the whole.
     if found.cost <= fitted.cost:
-        return _choose_plainest(context, found), known
+        return choose_plainest(context, found), known
     return (fitted if has_motion_forces(fitted.hypothesis) else _refine_from_both_starts(context, fitted)[0]), known
 
 
@@ -205,10 +205,11 @@ def _refine_similar(context: SearchContext, fitted: Fitted, known: Sensitivity) 
     for other in similar_hypotheses(fitted.hypothesis):
         beside = _refine_from(context, evaluate_fit(context.measure, context.tuning, fitted.deviations, other), known)
         best = beside if beside[0].cost < best[0].cost else best
-    return _choose_plainest(context, best[0]), best[1]
+    return choose_plainest(context, best[0]), best[1]
 
 
-def _choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
+def choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
+    """The plainest of the similar forms of the fit's laws that leaves hardly more than the best of them."""
     best = fitted
     for other in similar_hypotheses(fitted.hypothesis):
         plain = evaluate_fit(context.measure, context.tuning, best.deviations, other)

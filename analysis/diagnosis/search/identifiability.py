@@ -22,6 +22,7 @@ from analysis.diagnosis.errors.intervals import (
     standard_errors,
 )
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit
+from analysis.diagnosis.search.compare_candidates import choose_plainest
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import both_stand
 from analysis.diagnosis.search.revise_selection import without_effect
@@ -95,7 +96,10 @@ def _finish(context: SearchContext, fitted: Fitted, time_left: TimeBudget) -> tu
     def sensitivity_of(at: Fitted) -> Sensitivity:
         return _sensitivity_of(context, at)
 
-    return finish_fit(context.measure, context.tuning, fitted, sensitivity_of, time_left)
+    finished, known = finish_fit(context.measure, context.tuning, fitted, sensitivity_of, time_left)
+    # The last steps may leave the plain form of a law by a hair, where two of its parameters do the same.
+    plainest = choose_plainest(context, finished)
+    return (finished, known) if plainest is finished else (plainest, sensitivity_of(plainest))
 
 
 def _with_sensitivity(context: SearchContext, last: Fitted) -> tuple[Fitted, Sensitivity]:

@@ -8,7 +8,7 @@ from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_c
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retune_alone
-from analysis.diagnosis.search.revise_selection import exchange_effects
+from analysis.diagnosis.search.revise_selection import exchange_effects, exchange_for_refinement
 from analysis.diagnosis.search.search import _drop_negligible, prune
 from analysis.diagnosis.search.time_budget import CountedBudget, always
 from analysis.diagnosis.settings import SEARCH_ON
@@ -89,6 +89,37 @@ def test_a_discarded_effect_is_no_rival_of_the_one_that_stays(limited_and_late, 
 def test_an_effect_that_is_not_to_be_named_takes_no_place(limited_and_late, compromised):
     barred = replace(limited_and_late, barred=frozenset({"force_saturation"}))
     assert exchange_effects(barred, compromised, CATALOGUE, quiet, always) is compromised
+
+
+@pytest.fixture(scope="module")
+def rubbing_and_late(arena_of):
+    rubs = PlacedEffect(EFFECTS["asymmetric_friction"], (0,), {"level_positive": 0.05, "level_negative": 0.12})
+    return arena_of((rubs, PlacedEffect(EFFECTS["sensor_lag"], (0,), {"bandwidth": LAG_HZ})))
+
+
+def test_a_plain_law_is_exchanged_for_its_refinement_beside_the_second(rubbing_and_late, monkeypatch):
+    import analysis.diagnosis.search.revise_selection as revised
+
+    tried, find = [], revised.find_next_effect
+
+    def find_and_note(context, catalogue, base, step):
+        tried.append({effect.name for effect in catalogue})
+        return find(context, catalogue, base, step)
+
+    monkeypatch.setattr(revised, "find_next_effect", find_and_note)
+    plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
+    assert plain.after.score.worst_channel > SEARCH_ON
+    everything = list(EFFECTS.values())
+    found = exchange_for_refinement(rubbing_and_late, plain, everything, quiet, always)
+    assert names(found) == ["asymmetric_friction", "sensor_lag"]
+    assert found.after.score.worst_channel < SEARCH_ON
+    assert all(each <= {e.name for e in everything if "coulomb_friction" in e.simpler} for each in tried)
+
+
+def test_a_law_without_refinements_stays(rubbing_and_late):
+    plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
+    none = [EFFECTS[name] for name in ("viscous_damping", "sensor_lag")]
+    assert exchange_for_refinement(rubbing_and_late, plain, none, quiet, always) is plain
 
 
 def test_of_three_the_one_that_stood_in_is_dropped(limited_and_late):

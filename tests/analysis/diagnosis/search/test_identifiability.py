@@ -171,3 +171,18 @@ def test_one_segment_tells_nothing_between_segments(rubbing):
     found = fitted(rubbing, FRICTION)
     noise = final_errors(alone, found)
     assert interval_errors(alone, found, noise) == pytest.approx(INTERVAL_FACTOR * noise)
+
+
+def test_a_jump_that_no_sample_shows_does_not_leave_a_dead_band_open(arena_of):
+    dead = arena_of((PlacedEffect(EFFECTS["force_deadband"], (0,), {"width": 0.02, "jump": 0.0}),))
+    base = dead.candidate(retune_alone(dead))
+    start = evaluate_fit(
+        dead.measure, dead.tuning, base.fitted.deviations, claim("force_deadband", width=0.02, jump=1e-3)
+    )
+    step = dead.candidate(start)
+    found = Explanation(*(dead.with_test_score(each) for each in (base, base, step)), ((step,),), (step,))
+    left = keep_identifiable(dead, found, always)
+    assert names(left) == ["force_deadband"]
+    placed = left.after.fitted.hypothesis.placed_effects()[0]
+    assert placed.values["jump"] == 0.0
+    assert placed.values["width"] == pytest.approx(0.02, rel=0.1)
