@@ -173,15 +173,16 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
 
 def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
     """(parameters,): standard errors from the information matrix, with the information attributed to chance
-    subtracted."""
+    subtracted. What is left is scaled in rows and columns alike: subtracted from the diagonal alone, the rest of the
+    matrix would no longer be positive definite where parameters are correlated."""
     numbers = at.hypothesis.numbers
     first = len(products) - len(numbers)
     chance = _weight(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))
-    information = products.copy()
+    share = np.ones(len(products))
     for k, number in enumerate(numbers, start=first):
         by_chance = float(chance @ chance) / (2 * view.ensemble * _move(number) ** 2)
-        information[k, k] -= min(by_chance, MOST_BY_CHANCE * products[k, k])
-    values, vectors = np.linalg.eigh(information)
+        share[k] -= min(by_chance / max(float(products[k, k]), 1e-300), MOST_BY_CHANCE)
+    values, vectors = np.linalg.eigh(products * np.sqrt(np.outer(share, share)))
     values = np.maximum(values, max(1e-9 * float(values[-1]), LEAST_KNOWN))
     spread = (vectors**2 / values).sum(axis=1) * max(at.cost, 1.0)
     return np.asarray(np.sqrt(spread[first:]))

@@ -66,7 +66,26 @@ def explain_impacts(
     others = list(places[1:])
     if RIVAL in effects:
         others.append(_fit_claim(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
-    return _judge(context, found, best, [rival.hypothesis for rival in others if _is_model(rival)])
+    named = _judge(context, found, best, [rival.hypothesis for rival in others if _is_model(rival)])
+    # Where the gap may be zero, something else makes the response irregular.
+    if named is None or any(open_effects(context, named)) or not _needs_gap(context, view, best):
+        return None
+    return named
+
+
+def _needs_gap(context: SearchContext, view: View, best: BandPowerFit) -> bool:
+    """Whether two bodies that touch without a gap, refitted, leave far more: the profile of the gap at zero."""
+    (claim,), (placed,) = best.hypothesis.claims, best.hypothesis.placed_effects()
+    free = claim.effect.parameters
+    closed = replace(claim.effect, parameters=tuple(replace(p, fixed=p.fixed or p.name == "gap") for p in free))
+    gap = next(p.lower for p in free if p.name == "gap")
+    hypothesis = hypothesis_of_claim(replace(claim, effect=closed), [{**placed.values, "gap": gap}])
+    without = fit_band_power(view, evaluate_hypothesis(view, best.deviations, hypothesis), FIRST_ROUNDS)
+    if not np.isfinite(without.cost):
+        return False
+    comparison = _comparison(context, best)
+    each = [comparison.score_candidate(fitted.deviations, fitted.hypothesis) for fitted in (best, without)]
+    return _is_convincing(*each)
 
 
 def _fit_claim(view: View, evidence: Evidence, claim: Claim) -> BandPowerFit:
@@ -168,9 +187,7 @@ def _judge(
     if not _is_convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals):
         return None
     statistic = Statistic(WORDS, comparison.chance, best.errors)
-    explained = Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
-    # Where the gap may be zero, something else makes the response irregular.
-    return None if any(open_effects(context, explained)) else explained
+    return Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
 
 
 def _comparison(context: SearchContext, best: BandPowerFit) -> _Comparison:
