@@ -76,10 +76,14 @@ def exchange_for_refinement(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
     """The explanation with its first effect exchanged for a refinement of the same law at the same place: what this
-    adds may be seen only beside the second effect, and is far fewer fits than the whole catalogue."""
+    adds may be seen only beside the second effect, and is far fewer fits than the whole catalogue. The law itself is
+    among those that are tried, so that a refinement must gain as much as in any step."""
     first = found.steps[0].newest if found.steps else ""
     refinements = [effect for effect in catalogue if first in effect.simpler]
-    return exchange_effects(context, found, refinements, progress, time_left) if refinements else found
+    if not refinements:
+        return found
+    tried = [*refinements, *(effect for effect in catalogue if effect.name == first)]
+    return exchange_effects(context, found, tried, progress, time_left)
 
 
 def _exchange_first(

@@ -113,7 +113,17 @@ def test_a_plain_law_is_exchanged_for_its_refinement_beside_the_second(rubbing_a
     found = exchange_for_refinement(rubbing_and_late, plain, everything, quiet, always)
     assert names(found) == ["asymmetric_friction", "sensor_lag"]
     assert found.after.score.worst_channel < SEARCH_ON
-    assert all(each <= {e.name for e in everything if "coulomb_friction" in e.simpler} for each in tried)
+    rubs = {"coulomb_friction", *(e.name for e in everything if "coulomb_friction" in e.simpler)}
+    assert all(each <= rubs for each in tried)
+
+
+def test_a_refinement_that_adds_little_takes_no_place(arena_of):
+    rubs = PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.08})
+    context = arena_of((rubs, PlacedEffect(EFFECTS["force_saturation"], (0,), {"limit": LIMIT_N})))
+    # The second effect is not the right one: what it leaves, a refinement of the first takes up in part.
+    found = found_of(context, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
+    assert found.after.score.worst_channel > SEARCH_ON
+    assert exchange_for_refinement(context, found, list(EFFECTS.values()), quiet, always) is found
 
 
 def test_a_law_without_refinements_stays(rubbing_and_late):
