@@ -2,6 +2,9 @@
 
 Two simulations of a drive with play diverge within a few impacts, however small their initial difference (Ott, Chaos in
 Dynamical Systems, chapter 4). So the difference between two simulations of one hypothesis takes the place of the noise.
+
+Where play alone leaves more than chance, a fault of the sensor is looked for beside it: its starting values come from
+the readings themselves (a line, repeats, a step, a limit), which need no prediction of the waveform.
 """
 
 from collections.abc import Sequence
@@ -14,14 +17,23 @@ from analysis.diagnosis.errors.band_power_fit import BandPowerFit, View, evaluat
 from analysis.diagnosis.errors.excited_segments import select_excited_segments
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
-from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, Hypothesis, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import (
+    NOTHING,
+    Claim,
+    Hypothesis,
+    combine,
+    hypothesis_of_claim,
+    without_claim,
+)
 from analysis.diagnosis.errors.output_error import evaluate_fit, expected_gain, gather_evidence
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.identifiability import open_effects
-from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.search_context import STARTING, FittedCandidate, SearchContext
+from analysis.diagnosis.search.starting_hypotheses import candidates
 from analysis.diagnosis.settings import (
+    EXPLAINED_BY_CHANCE,
     IMPACTS_AS_GOOD,
     IMPACTS_ERROR,
     IMPACTS_LEAST_SPREAD,
@@ -30,6 +42,7 @@ from analysis.diagnosis.settings import (
     VARIES_ERROR,
 )
 from equalizer.effects.effect import Effect, Values
+from equalizer.effects.placing import place_of_effect
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
@@ -66,20 +79,52 @@ def explain_impacts(
     others = list(places[1:])
     if RIVAL in effects:
         others.append(_fit_claim(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
-    named = _judge(context, found, best, [rival.hypothesis for rival in others if _is_model(rival)])
+    fits = _with_sensor_fault(context, view, best, [e for e in catalogue if place_of_effect(e) == "sensor"])
+    named = _judge(context, found, fits, [rival.hypothesis for rival in others if _is_model(rival)])
     # Where the gap may be zero, something else makes the response irregular.
-    if named is None or any(open_effects(context, named)) or not _needs_gap(context, view, best):
+    if named is None or any(open_effects(context, named)) or not _needs_gap(context, view, fits[-1]):
         return None
     return named
 
 
+def _with_sensor_fault(
+    context: SearchContext, view: View, alone: BandPowerFit, faults: Sequence[Effect]
+) -> tuple[BandPowerFit, ...]:
+    """The fit of play, and where it leaves more than chance, that of play with the sensor fault that lowers the cost
+    most, if this takes most of what is left."""
+    comparison = _comparison(context, alone)
+    before = comparison.score_candidate(alone.deviations, alone.hypothesis)
+    if _worst_part(before) <= EXPLAINED_BY_CHANCE:
+        return (alone,)
+    played = evaluate_fit(context.measure, context.tuning, alone.deviations, alone.hypothesis)
+    evidence = gather_evidence(context.measure, context.tuning, played)[0]
+    tried = [
+        evaluate_hypothesis(view, alone.deviations, combine(alone.hypothesis, fault))
+        for fault in candidates(faults, evidence, context.guard.over(context.map_, STARTING))
+    ]
+    if not tried:
+        return (alone,)
+    both = _refine(view, min(tried, key=lambda trial: trial.cost))
+    after = comparison.score_candidate(both.deviations, both.hypothesis)
+    return (alone, both) if _worst_part(after) <= (1 - IMPACTS_SHARE) * _worst_part(before) else (alone,)
+
+
+def _worst_part(candidate: FittedCandidate) -> float:
+    """The larger misfit over chance of the samples to choose by and to test, each the root mean square of channels."""
+    parts = (candidate.score.choose, candidate.score.test)
+    return max((_rms_over_channels(part) for part in parts if np.isfinite(part).any()), default=0.0)
+
+
 def _needs_gap(context: SearchContext, view: View, best: BandPowerFit) -> bool:
     """Whether two bodies that touch without a gap, refitted, leave far more: the profile of the gap at zero."""
-    (claim,), (placed,) = best.hypothesis.claims, best.hypothesis.placed_effects()
+    claim, placed = best.hypothesis.claims[0], best.hypothesis.placed_effects()[0]
     free = claim.effect.parameters
     closed = replace(claim.effect, parameters=tuple(replace(p, fixed=p.fixed or p.name == "gap") for p in free))
     gap = next(p.lower for p in free if p.name == "gap")
-    hypothesis = hypothesis_of_claim(replace(claim, effect=closed), [{**placed.values, "gap": gap}])
+    hypothesis = combine(
+        hypothesis_of_claim(replace(claim, effect=closed), [{**placed.values, "gap": gap}]),
+        without_claim(best.hypothesis, 0),
+    )
     without = fit_band_power(view, evaluate_hypothesis(view, best.deviations, hypothesis), FIRST_ROUNDS)
     if not np.isfinite(without.cost):
         return False
@@ -165,10 +210,14 @@ class _Comparison:
 
 
 def _judge(
-    context: SearchContext, found: Explanation, best: BandPowerFit, others: Sequence[Hypothesis]
+    context: SearchContext, found: Explanation, fits: Sequence[BandPowerFit], others: Sequence[Hypothesis]
 ) -> Explanation | None:
+    """The explanation by play, and by a sensor fault beside it where there is one; None where the re-tuned model or a
+    rival of play is as good. fits: of one more effect each."""
+    best = fits[-1]
     comparison = _comparison(context, best)
-    named = comparison.score_candidate(best.deviations, best.hypothesis)
+    steps = tuple(comparison.score_candidate(each.deviations, each.hypothesis) for each in fits)
+    named = steps[-1]
     given = np.zeros_like(best.deviations)
     before = comparison.score_candidate(given, NOTHING)
     linear = [
@@ -181,13 +230,14 @@ def _judge(
     rivals += [
         comparison.score_candidate(candidate.fitted.deviations, candidate.fitted.hypothesis)
         for candidate in earlier
-        if candidate.fitted.hypothesis.key[-1] != best.hypothesis.key[-1]
+        if candidate.fitted.hypothesis.key[-1] != fits[0].hypothesis.key[-1]
     ]
     rivals.sort(key=lambda rival: rival.score.mean_log_error)
     if not _is_convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals):
         return None
     statistic = Statistic(WORDS, comparison.chance, best.errors)
-    return Explanation(before, retuned, named, ((named, *rivals),), (named,), statistic)
+    rounds = ((steps[0], *rivals), *((step,) for step in steps[1:]))
+    return Explanation(before, retuned, named, rounds, steps, statistic)
 
 
 def _comparison(context: SearchContext, best: BandPowerFit) -> _Comparison:

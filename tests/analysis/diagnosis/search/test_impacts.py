@@ -1,6 +1,7 @@
 """Play that rattles, told by the band powers of the response; what does not rattle is left alone."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,9 +10,10 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
 from analysis.diagnosis.errors.band_power import BandPower
+from analysis.diagnosis.errors.band_power_fit import _errors, _move
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.fit_score import FitScore
-from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.assemble_findings import impact_remainder
@@ -22,7 +24,7 @@ from analysis.diagnosis.search.impacts import explain_impacts, is_irregular
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
 from equalizer.effects.backlash import EFFECT as PLAY
-from equalizer.effects.catalogue import CATALOGUE
+from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.coulomb_friction import EFFECT as DRY
 from equalizer.effects.effect import PlacedEffect
 from study.evaluation.challenge.draw_case import draw_case
@@ -68,6 +70,17 @@ def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
     assert values["gap"] == pytest.approx(GAP_M, rel=0.1)
 
 
+def test_errors_stay_small_where_parameters_are_correlated():
+    """Two columns with a correlation of 0.95, of whose information a third is chance."""
+    number = hypothesis_of_claim(Claim(PLAY, "one", (AXIS,)), [LOOSE[0].values]).numbers[0]
+    power = 2 * _move(number) ** 2
+    view = SimpleNamespace(spread=np.sqrt(power * 30.0), ensemble=1, weights=np.ones((1, 1, 1)))
+    at = SimpleNamespace(hypothesis=SimpleNamespace(numbers=(number, number)), predicted=np.zeros((1, 1, 1)), cost=1.0)
+    errors = _errors(view, at, np.array([[90.0, 85.5], [85.5, 90.0]]))
+    # Without chance: 1 / sqrt(90 (1 - 0.95^2)) = 0.34; with two thirds of the information, sqrt(3 / 2) of that.
+    assert errors == pytest.approx([0.34 * np.sqrt(1.5)] * 2, rel=0.01)
+
+
 def test_it_is_as_far_from_the_record_as_chance_takes_it(told):
     assert judge(told).verdict == "explained"
     assert told.after.score.worst_channel < 2.5 < told.retuned.score.worst_channel
@@ -88,6 +101,32 @@ def test_a_gap_whose_interval_contains_zero_is_open(loose, told):
 
 def test_play_whose_gap_is_open_is_not_named(loose, monkeypatch):
     monkeypatch.setattr("analysis.diagnosis.search.identifiability.INTERVAL_FACTOR", 1e6)
+    assert explain_impacts(*loose, CATALOGUE) is None
+
+
+@pytest.fixture(scope="module")
+def humming(diagnosed):
+    hum = PlacedEffect(EFFECTS["mains_hum"], (0, 1), {"amplitude": 2.0, "frequency": 60.0, "phase": 1.0})
+    return explain_impacts(*searched(diagnosed, (*LOOSE, hum)), CATALOGUE)
+
+
+def test_a_hum_of_the_sensor_is_named_beside_play(humming):
+    assert [each.effect.name for each in humming.after.fitted.hypothesis.claims] == ["backlash", "mains_hum"]
+    played, *_, hum = humming.after.fitted.hypothesis.placed_effects()
+    assert played.values["gap"] == pytest.approx(GAP_M, rel=0.2)
+    assert hum.values["frequency"] == pytest.approx(60.0, abs=0.5)
+    assert hum.values["amplitude"] == pytest.approx(2.0, rel=0.2)
+    assert len(humming.steps) == len(humming.rounds) == 2
+    assert len(humming.statistic.errors) == len(humming.after.fitted.hypothesis.point)
+    assert judge(humming).verdict == "explained"
+
+
+def test_beside_play_alone_no_fault_of_the_sensor_is_named(told):
+    assert len(told.steps) == 1
+
+
+def test_without_a_gap_two_bodies_that_touch_are_no_play(loose, told, monkeypatch):
+    monkeypatch.setattr("analysis.diagnosis.search.impacts._needs_gap", lambda *asked: False)
     assert explain_impacts(*loose, CATALOGUE) is None
 
 
