@@ -14,7 +14,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFitRefused,
     MechanicalFitSettings,
 )
-from equalizer.identification.mechanical.mechanical_level import RigidBody, fit_rigid_body, remove_friction_damping
+from equalizer.identification.mechanical.rigid_body import RigidBody, fit_rigid_body, remove_friction_damping
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
