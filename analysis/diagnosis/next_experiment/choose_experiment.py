@@ -148,7 +148,7 @@ def _gains(
         there[number] += DIFFERENCE_STEP
         moved = _simulate(bench, there, rival.hypothesis, rival.hypothesis.point, experiment)
         columns.append((moved - base) / DIFFERENCE_STEP)
-    for number, of in enumerate(rival.hypothesis.numbers):
+    for number, of in enumerate(rival.hypothesis.parameters):
         point = rival.hypothesis.point.copy()
         point[number] += of.move
         columns.append((_simulate(bench, rival.deviations, rival.hypothesis, point, experiment) - base) / of.move)
