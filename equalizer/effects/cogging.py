@@ -24,12 +24,14 @@ the step's motion per newton, below 1 unless a pitch is crossed within a step. B
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Mean of the force at the step's start and end; the position at the end depends on the force (implicit step)."""
-    start, force = np.sin(numbers[1] * at[X] + numbers[2]), 0.0
+    start, force = np.sin(parameters[1] * at[X] + parameters[2]), 0.0
     for _ in range(_ITERATIONS):
-        force = 0.5 * numbers[0] * (start + np.sin(numbers[1] * (at[X_FREE] + at[X_PER_N] * force) + numbers[2]))
-    at[F_END] = numbers[0] * np.sin(numbers[1] * (at[X_FREE] + at[X_PER_N] * force) + numbers[2])
+        force = (
+            0.5 * parameters[0] * (start + np.sin(parameters[1] * (at[X_FREE] + at[X_PER_N] * force) + parameters[2]))
+        )
+    at[F_END] = parameters[0] * np.sin(parameters[1] * (at[X_FREE] + at[X_PER_N] * force) + parameters[2])
     return float(force)
 
 
