@@ -10,6 +10,7 @@ from analysis.psychophysics.hierarchy.quadrature import Quadrature, integrate
 from equalizer.signals.signal import FloatArray
 
 NEWTON_STEPS = 10
+"""Most Newton steps of one climb to a maximum. By hand."""
 SETTLED = {COARSE: 0.1, FINE: 1e-3, FIXED: 1e-3}
 """Twice the gain in log-likelihood that the next step would bring: 0.001 is a thirtieth of a standard error, and the
 step before it was that of a quadratic function already."""

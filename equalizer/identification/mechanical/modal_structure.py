@@ -15,6 +15,8 @@ _LARGEST_RATIO = 100.0
 _WEAKEST = 1e-9
 """Least strength of a mode, relative to the strongest."""
 _SHARE = 0.5
+"""Largest strength at the force of a further mode, relative to the strongest of the rigid body; its
+readings are scaled up by what it loses. By hand."""
 _ALIKE = 1.5
 """Frequencies within this ratio of the slowest are those of the rigid body."""
 

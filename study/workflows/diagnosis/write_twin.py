@@ -32,6 +32,7 @@ from study.workflows.recording.record_device import RecordingPlan, record_device
 
 TITLE = "The model was not made"
 STANDARD_GRAVITY = 9.80665
+"""m/s², exact by definition."""
 SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)
 """ADXL335 by its data sheet, with the capacitors of its board."""
 ACTUATOR = ActuatorLimits(bandwidth_hz=600.0)
