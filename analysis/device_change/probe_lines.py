@@ -20,16 +20,19 @@ DRIVEN_SHARE = 0.1
 """Least amplitude of a driven line, relative to an axis's strongest: weaker ones are due to rounding and the spring."""
 
 FROM_HZ = 3.0
-"""Integrated twice, what the accelerometer says below is drift."""
+"""Lower end of the lines at which the acceleration is integrated twice: below it, the result is the sensor's drift. By
+hand."""
 
 TO_HZ = 150.0
-"""Upper end of the compared lines: above it the position hardly moves."""
+"""Upper end of the lines that make up the position: above it, it hardly moves. By hand."""
 
 BREAK_AWAYS_M = (2e-6, 8e-6, 2e-5, 5e-5)
-"""Lengths over which friction builds up, from almost none to a soft one; the best-fitting one is taken."""
+"""Lengths over which friction builds up, from almost none to a soft one; the best-fitting one is taken. By
+hand."""
 
 PASSES = 3
-"""Periods gone through until the force repeats."""
+"""Periods computed until Dahl's force, which remembers its start, repeats: it forgets within a few break-away
+lengths."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +80,8 @@ def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
 
 
 MASS_LINES_HZ = (30.0, 60.0)
-"""Lines at which friction, springs and the linkage's modes matter little."""
+"""Lines between which the response is nearly that of a mass: friction and springs matter below, the linkage's modes
+above."""
 
 
 def apparent_mass_kg(lines: ProbeLines) -> float:

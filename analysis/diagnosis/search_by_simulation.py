@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
 """Laws of the command that a force balance tests: those that it does not name are absent."""
 LOWEST_MAINS_HZ = 45.0
+"""Lowest frequency of a tone that is taken for mains hum (Hz): grids run at 50 or 60 Hz."""
 GAINS = ("force_gain", "sensor_gain")
 """Effects that a model fitted to the recordings absorbs: only with a calibrated model can a gain be found wrong."""
 

@@ -10,7 +10,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.psychometric import draw_people_curves, draw_person_curves
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
-from analysis.figures.units import draw_units, is_drawn
+from analysis.figures.thresholds_by_unit import draw_thresholds_by_unit, is_drawn
 from analysis.psychophysics.detection import above_detection
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.hierarchy.answers import count_answers
@@ -83,7 +83,7 @@ def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
                 if tables[-1].quantity == "above_detection_db"
                 else ""
             ),
-            figure=draw_units(tables),
+            figure=draw_thresholds_by_unit(tables),
         )
     ]
 

@@ -10,7 +10,7 @@ from equalizer.signals.recording import Recording
 
 CLOCK = "clock"
 GAP = 1.5
-"""Steps between two stamps that are a gap."""
+"""Difference of two stamps, in steps, from which it is a gap."""
 JITTER, WILD = 0.02, 0.2
 """Rms deviation of stamps from their places, in steps: from the first it is reported, from the second phases fail."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1e5
@@ -27,7 +27,7 @@ def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Che
                 CLOCK,
                 "notice",
                 "No time is known: samples are numbered, and the rate of 1 Hz is nominal.",
-                "Nothing that hangs on speed, frequency or delay can be said of it.",
+                "Nothing that depends on speed, frequency or delay can be said of it.",
             ),
         )
     if recording.time_s is None:

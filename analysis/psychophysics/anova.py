@@ -2,7 +2,12 @@
 
 It treats all values as coming from different people. Where the same people gave all groups (here: every participant
 takes every frequency) their differences stay in the error term, and the test is weaker than the data allow; see
-`analysis.psychophysics.repeated_measures` for the analysis that takes them out.
+`analysis.psychophysics.repeated_measures` for the analysis that removes them. With k groups and N values,
+
+    F = (SS_between / (k - 1)) / (SS_within / (N - k))          eta² = SS_between / SS_total
+    omega² = (SS_between - (k - 1) MS_within) / (SS_total + MS_within)
+
+References: Fisher, Statistical Methods for Research Workers (1925); Hays, Statistics (1963), for omega².
 """
 
 import math
@@ -28,7 +33,7 @@ class GroupSummary:
 
 @dataclass(frozen=True, slots=True)
 class OneWayAnova:
-    """Numbers that the data do not give are None; `notes` say why, in sentences."""
+    """Result of a one-way ANOVA. Values that the data do not determine are None; `notes` say why, in sentences."""
 
     groups: tuple[GroupSummary, ...]
     df_between: int | None

@@ -34,7 +34,7 @@ STEP = 1e-3
 class TobitFit:
     """Maximum-likelihood estimate of Tobit's model of reversal means."""
 
-    numbers: FloatArray
+    parameters: FloatArray
     """(k + 2,): means in dB, log SD of people, log SD of the error."""
     covariance: FloatArray
     """Inverse curvature of minus the log-likelihood."""
@@ -55,7 +55,7 @@ def tobit_contrasts(
     values_db, cut, known = values_db[:, bounded], cut[:, bounded], known[:, bounded]
     fit = fit_tobit(values_db, cut)
     k, df = len(frequencies_hz), len(values_db) - 1
-    sizes = fit.numbers[1:k] - fit.numbers[0]
+    sizes = fit.parameters[1:k] - fit.parameters[0]
     errors = np.sqrt(np.diag(fit.covariance)[1:k] + fit.covariance[0, 0] - 2.0 * fit.covariance[0, 1:k])
     half = float(student.ppf(0.5 + confidence / 2, df)) * errors
     p_values = [float(p) for p in 2.0 * student.sf(np.abs(sizes / errors), df)]
@@ -83,8 +83,8 @@ def fit_tobit(values_db: FloatArray, cut: NDArray[np.bool_]) -> TobitFit:
     k = values_db.shape[1]
     begin = np.concatenate([np.nanmean(values_db, axis=0), [0.7, 0.7]])
 
-    def cost(numbers: FloatArray) -> float:
-        return -_log_likelihood(numbers, values_db, cut)
+    def cost(parameters: FloatArray) -> float:
+        return -_log_likelihood(parameters, values_db, cut)
 
     bounds = [(None, None)] * k + [SD_BOUNDS_DB] * 2
     found = minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-6})
@@ -101,10 +101,10 @@ def _second(cost: Callable[[FloatArray], float], at: FloatArray, a: FloatArray, 
     return (cost(at + a + b) - cost(at + a - b) - cost(at - a + b) + cost(at - a - b)) / 4.0
 
 
-def _log_likelihood(numbers: FloatArray, values_db: FloatArray, cut: NDArray[np.bool_]) -> float:
+def _log_likelihood(parameters: FloatArray, values_db: FloatArray, cut: NDArray[np.bool_]) -> float:
     k = values_db.shape[1]
-    spread, error = math.exp(numbers[k]), math.exp(numbers[k + 1])
-    z = (values_db[:, :, None] - numbers[:k, None] - spread * NODES) / error
+    spread, error = math.exp(parameters[k]), math.exp(parameters[k + 1])
+    z = (values_db[:, :, None] - parameters[:k, None] - spread * NODES) / error
     exact = -0.5 * z**2 - math.log(error) - 0.5 * math.log(2.0 * math.pi)
     cells = np.where(np.isnan(z), 0.0, np.where(cut[:, :, None], log_ndtr(-z), exact))
     return float(logsumexp(cells.sum(axis=1), b=WEIGHTS / math.sqrt(2.0 * math.pi), axis=1).sum())

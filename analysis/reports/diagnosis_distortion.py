@@ -17,19 +17,20 @@ _WORDS: Mapping[Kind, str] = {
     "either": "Odd or even",
     "varying": "Varying between periods",
 }
-_COURSES = {
+_TREND_WORDS = {
     "falls": "falls as the level rises",
     "rises": "rises with the level",
     "rises from nothing": "is there only at higher levels",
     "stays": "keeps its share at all levels",
     "": "is there, at too few levels to say how it grows",
 }
-_HEARD = 0.1
-"""Response relative to the largest of its quantity, input and level, below which a channel has no row."""
+_LEAST_RESPONSE = 0.1
+"""Response relative to the largest of its quantity, input and level, below which a channel has no row. By hand."""
 
 
 def distortion_sections(found: Findings) -> list[Section]:
-    """Empty where nothing was asked."""
+    """The section on distortion, with trends over the level in words and a table; empty where distortion was not
+    examined."""
     measured = found.local.distortions
     if not measured.cells and not measured.remarks:
         return []
@@ -46,15 +47,15 @@ def distortion_sections(found: Findings) -> list[Section]:
 def _trend_paragraphs(cells: Sequence[Distortion]) -> tuple[str, ...]:
     if not cells:
         return ()
-    heard = [cell for cell in cells if cell.whole_band and _is_heard(cell, cells)]
+    responding = [cell for cell in cells if cell.whole_band and _responds(cell, cells)]
     groups: dict[tuple[Kind, str], list[LevelTrend]] = {}
-    for trend in level_trends(heard):
+    for trend in level_trends(responding):
         if trend.present:
             groups.setdefault((trend.kind, trend.level_dependence), []).append(trend)
     if not groups:
         return ("No distortion stands out of the noise: from repeats and silent lines the device looks linear.",)
     return tuple(
-        f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_COURSES[series]}: "
+        f"{_WORDS[kind]}{' distortion' if kind != 'varying' else ''} {_TREND_WORDS[series]}: "
         f"{conjoin([f'{each.output} driven by {each.input}' for each in trends])}."
         for (kind, series), trends in groups.items()
     )
@@ -62,10 +63,10 @@ def _trend_paragraphs(cells: Sequence[Distortion]) -> tuple[str, ...]:
 
 def _distortion_table(found: Findings) -> Table | None:
     cells = [cell for cell in found.local.distortions.cells if cell.whole_band]
-    heard = [cell for cell in cells if _is_heard(cell, cells)]
-    kinds = [kind for kind in _KINDS if any(item.kind == kind for item in heard)]
+    responding = [cell for cell in cells if _responds(cell, cells)]
+    kinds = [kind for kind in _KINDS if any(item.kind == kind for item in responding)]
     rows: dict[tuple[str, str, str, float], dict[Kind, Distortion]] = {}
-    for each in heard:
+    for each in responding:
         rows.setdefault((each.output, each.quantity, each.input, each.amplitude), {})[each.kind] = each
     if not rows:
         return None
@@ -84,21 +85,22 @@ def _distortion_table(found: Findings) -> Table | None:
             for (output, quantity, input_, level), mine in rows.items()
         ),
         (
-            "Root-mean-square over the driven band. <: not seen, and less than this would not have been. Channels "
-            "that hear less than a tenth of the loudest are left out.",
+            "Root-mean-square over the driven band. <: below the detection limit, which is stated. "
+            "Channels with less than a tenth of the strongest response are left out.",
         ),
         folded=True,
     )
 
 
-def _is_heard(cell: Distortion, cells: Sequence[Distortion]) -> bool:
+def _responds(cell: Distortion, cells: Sequence[Distortion]) -> bool:
+    """Whether its response is at least `_LEAST_RESPONSE` of the strongest of its quantity, input and level."""
     beside = [
         each.signal_rms
         for each in cells
         if (each.quantity, each.input, each.amplitude, each.whole_band)
         == (cell.quantity, cell.input, cell.amplitude, cell.whole_band)
     ]
-    return cell.signal_rms > _HEARD * max(beside)
+    return cell.signal_rms > _LEAST_RESPONSE * max(beside)
 
 
 def _noise_rms(found: Findings) -> dict[tuple[str, str], float]:

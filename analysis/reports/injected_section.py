@@ -2,8 +2,15 @@
 
 from collections.abc import Sequence
 
-from analysis.evaluation.proof.injected import DETECTABLE, JUDGED, InjectedOutcome, Tally, injected_figures, tallies
-from analysis.evaluation.proof.share import Figure
+from analysis.evaluation.blind_test.injected import (
+    DETECTABLE,
+    JUDGED,
+    InjectedOutcome,
+    Tally,
+    injected_figures,
+    tallies,
+)
+from analysis.evaluation.blind_test.share import Figure
 from analysis.reports.page import Section, Table
 
 

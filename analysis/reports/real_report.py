@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from analysis.diagnosis.real_answer.real_answer import OwnNumber, PairOutcome, RealAnswer
 from analysis.diagnosis.unit_wording import error_text, value_text
-from analysis.evaluation.proof.injected import InjectedOutcome
+from analysis.evaluation.blind_test.injected import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import error_rows
 from analysis.figures.picture import Picture
 from analysis.reports.injected_section import injected_section

@@ -15,8 +15,8 @@ _GUESS = 1.3
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    return float(friction_force(numbers[0], numbers[1], memory[0], memory, at))
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    return float(friction_force(parameters[0], parameters[1], memory[0], memory, at))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:

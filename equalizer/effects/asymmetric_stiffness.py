@@ -12,16 +12,16 @@ from equalizer.signals.signal import FloatArray
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Mean of the force at the step's start and end; the position at the end depends on the force (implicit step, by
     Newton's method)."""
-    half, start = 0.5 * numbers[0], at[X] ** 2
+    half, start = 0.5 * parameters[0], at[X] ** 2
     force = -half * (start + at[X_FREE] ** 2)
     for _ in range(4):
         end = at[X_FREE] + at[X_PER_N] * force
         residual = force + half * (start + end**2)
         force -= residual / max(1 + 2 * half * at[X_PER_N] * end, 0.5)
-    at[F_END] = -numbers[0] * (at[X_FREE] + at[X_PER_N] * force) ** 2
+    at[F_END] = -parameters[0] * (at[X_FREE] + at[X_PER_N] * force) ** 2
     return float(force)
 
 

@@ -27,9 +27,9 @@ of a spectrum's window in seconds."""
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Force of the contact's spring and damper, averaged over the step; the contact only pushes, it never pulls."""
-    half, stiffness, rate = 0.5 * numbers[0], numbers[1], numbers[2] / at[STEP_S]
+    half, stiffness, rate = 0.5 * parameters[0], parameters[1], parameters[2] / at[STEP_S]
     for way in (1.0, -1.0):
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
         if start <= 0 and end <= 0:

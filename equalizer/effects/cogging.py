@@ -1,4 +1,4 @@
-"""Cogging: a force that is periodic in position, as of magnets over iron, teeth, or the lay of a cable."""
+"""Cogging: a force that is periodic in position, as of magnets over iron, gear teeth, or the strands of a cable."""
 
 import numpy as np
 
@@ -11,20 +11,27 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 CELLS = 4096
-"""Cells of the histogram of positions over the travel."""
+"""Cells of the histogram of positions over the travel: the shortest pitch that is found is four cells long."""
 PITCHES = 3
-"""Number of pitches that are tried, strongest peak of the periodogram first."""
+"""Number of pitches that are tried, strongest peak of the periodogram first. By hand."""
 _FINER = 8
-"""Points of the spectrum per line of the position's grid."""
+"""Points of the spectrum per line of the position's grid (zero padding), so that a peak between lines is found."""
+_LEAST_PERIODS = 2
+"""Periods over the travel from which on a peak counts: fewer look like a spring."""
+_ITERATIONS = 4
+"""Fixed-point iterations of the implicit step: each multiplies the error by the force's slope over the position times
+the step's motion per newton, below 1 unless a pitch is crossed within a step. By hand."""
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Mean of the force at the step's start and end; the position at the end depends on the force (implicit step)."""
-    start, force = np.sin(numbers[1] * at[X] + numbers[2]), 0.0
-    for _ in range(4):
-        force = 0.5 * numbers[0] * (start + np.sin(numbers[1] * (at[X_FREE] + at[X_PER_N] * force) + numbers[2]))
-    at[F_END] = numbers[0] * np.sin(numbers[1] * (at[X_FREE] + at[X_PER_N] * force) + numbers[2])
+    start, force = np.sin(parameters[1] * at[X] + parameters[2]), 0.0
+    for _ in range(_ITERATIONS):
+        force = (
+            0.5 * parameters[0] * (start + np.sin(parameters[1] * (at[X_FREE] + at[X_PER_N] * force) + parameters[2]))
+        )
+    at[F_END] = parameters[0] * np.sin(parameters[1] * (at[X_FREE] + at[X_PER_N] * force) + parameters[2])
     return float(force)
 
 
@@ -40,7 +47,8 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _likely_pitches(motion: AxisMotion, beside: PartialRegression) -> list[float]:
-    """Starting values from a periodogram of the missing force over the position."""
+    """Starting values of the pitch (m) from a periodogram of the missing force over the position, strongest first; none
+    where the axis does not move. beside: the regression of the missing force on linear terms."""
     way = float(np.ptp(motion.position))
     if way == 0:
         return []
@@ -51,7 +59,7 @@ def _likely_pitches(motion: AxisMotion, beside: PartialRegression) -> list[float
     # Cells are weighted alike: noise from where the axis dwells would otherwise hide the pattern.
     weight = 1 / np.sqrt(np.maximum(smooth, 1.0))
     power = np.abs(np.fft.rfft(force * weight, CELLS * _FINER)) ** 2
-    power[: 2 * _FINER] = 0
+    power[: _LEAST_PERIODS * _FINER] = 0
     power[CELLS * _FINER // 4 :] = 0
     pitches = []
     for _ in range(PITCHES):
@@ -64,6 +72,7 @@ def _likely_pitches(motion: AxisMotion, beside: PartialRegression) -> list[float
 
 
 def _fit_pitch(motion: AxisMotion, beside: PartialRegression, pitch: float) -> tuple[float, Values]:
+    """Explained sum of squares, and amplitude and phase, by least squares on sine and cosine of this pitch."""
     angle = 2 * np.pi * motion.position / pitch
     fit = beside.fit(np.sin(angle), np.cos(angle))
     sine, cosine = fit.strengths.tolist()

@@ -11,8 +11,8 @@ from equalizer.signals.signal import FloatArray
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    return float(numbers[0])
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    return float(parameters[0])
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:

@@ -16,8 +16,8 @@ from equalizer.signals.signal import FloatArray
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    return float(friction_force(numbers[0], numbers[0], memory[0], memory, at))
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    return float(friction_force(parameters[0], parameters[0], memory[0], memory, at))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:

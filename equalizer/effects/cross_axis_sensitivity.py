@@ -8,10 +8,11 @@ from equalizer.effects.starts.response_starts import shares_of
 from equalizer.signals.signal import FloatArray
 
 FROM = ("from_next", "from_after_next")
+"""Parameters: share of the next channel and of the one after it, counted cyclically."""
 LARGEST = 1.0
-"""Largest share of another channel: beyond it the channels would be exchanged."""
+"""Largest share of another channel: beyond it the channels would be exchanged, which is an error of wiring."""
 LEAST = 1e-4
-"""Least share that is tried."""
+"""Least share that is tried: a hundredth of what data sheets of accelerometers allow (1 %)."""
 
 
 def _next_channels(channel: int, channels: int) -> list[int]:

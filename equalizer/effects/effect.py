@@ -57,10 +57,10 @@ class AxisForce:
     """A force along a driven axis that depends on the motion."""
 
     law: Any
-    """Compiled function law(numbers, memory, at) -> force in N; `equalizer.effects.simulation.instant` documents
+    """Compiled function law(parameters, memory, at) -> force in N; `equalizer.effects.simulation.instant` documents
     `at`."""
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
-    """The law's `numbers` from model, axis and values."""
+    """The law's `parameters` from model, axis and values."""
     memory: int = 0
     """Number of state variables that the law keeps between steps; they start at zero."""
     steps: int = STEPS
@@ -81,7 +81,7 @@ class JointForce:
     coordinates along which the joint moves and its force acts."""
     law: Any
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
-    """The law's `numbers`; the model is that before `change`."""
+    """The law's `parameters`; the model is that before `change`."""
     memory: int = 0
     steps: int = STEPS
     acceleration: bool = False

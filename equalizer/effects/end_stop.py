@@ -15,15 +15,15 @@ SHARES, FINER = np.linspace(0.3, 0.98, 18), np.linspace(-0.04, 0.04, 9)
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Mean of the force at the step's start and end. A stop only pushes, and its penetration at the end depends on its
     force (implicit step)."""
     force = last = 0.0
     for side in range(2):
-        way = numbers[2 + side]
-        stiffness = numbers[1] if side == 0 else numbers[1] * numbers[4]
-        start = max(way * at[X] - numbers[0], 0.0)
-        end = way * (at[X_FREE] + at[X_PER_N] * force) - numbers[0]
+        way = parameters[2 + side]
+        stiffness = parameters[1] if side == 0 else parameters[1] * parameters[4]
+        start = max(way * at[X] - parameters[0], 0.0)
+        end = way * (at[X_FREE] + at[X_PER_N] * force) - parameters[0]
         # Weighted towards the force at the end where the stop is too stiff for the step: the mean would overshoot.
         slack = stiffness * at[X_PER_N]
         late = (0.5 + slack) / (1 + slack)

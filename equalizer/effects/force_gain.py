@@ -7,7 +7,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST = 1e-4
-"""Least deviation of a gain from 1 that is tried."""
+"""Least deviation of a gain from 1 that is tried. By hand."""
 
 
 def _scale_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
@@ -17,6 +17,8 @@ def _scale_force(commands: FloatArray, step_s: float, values: Values) -> FloatAr
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     which, used = slice(None) if axis == ALL_SITES else slice(axis, axis + 1), evidence.used > 0
     commanded, missing = evidence.command[used, which], evidence.axis_force[used, which]
+    # Missing force over command, by least squares; also over the command of the sample before, as the estimated force
+    # may lie a sample behind.
     shares = [
         float(np.sum(np.roll(commanded, shift, axis=0) * missing) / max(np.sum(commanded**2), np.finfo(float).tiny))
         for shift in (0, 1)

@@ -15,12 +15,12 @@ LEAST_TRAVEL_RAD = 0.5
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Mean of the torque at the step's start and end; the angle at the end depends on the torque (implicit step)."""
-    start, torque = np.sin(at[X] + numbers[1]), 0.0
+    start, torque = np.sin(at[X] + parameters[1]), 0.0
     for _ in range(4):
-        torque = -0.5 * numbers[0] * (start + np.sin(at[X_FREE] + at[X_PER_N] * torque + numbers[1]))
-    at[F_END] = -numbers[0] * np.sin(at[X_FREE] + at[X_PER_N] * torque + numbers[1])
+        torque = -0.5 * parameters[0] * (start + np.sin(at[X_FREE] + at[X_PER_N] * torque + parameters[1]))
+    at[F_END] = -parameters[0] * np.sin(at[X_FREE] + at[X_PER_N] * torque + parameters[1])
     return float(torque)
 
 

@@ -12,15 +12,15 @@ from equalizer.signals.signal import FloatArray
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Mean of the force at the step's start and end; the position at the end depends on the force (implicit step)."""
-    half, start = 0.5 * numbers[0], at[X] ** 3
+    half, start = 0.5 * parameters[0], at[X] ** 3
     force = -half * (start + at[X_FREE] ** 3)
     for _ in range(4):
         end = at[X_FREE] + at[X_PER_N] * force
         off = force + half * (start + end**3)
         force -= off / (1 + 3 * half * at[X_PER_N] * end * end)
-    at[F_END] = -numbers[0] * (at[X_FREE] + at[X_PER_N] * force) ** 3
+    at[F_END] = -parameters[0] * (at[X_FREE] + at[X_PER_N] * force) ** 3
     return float(force)
 
 

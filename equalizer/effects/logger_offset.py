@@ -9,12 +9,14 @@ from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 LONGEST_S = 1.0
-"""Largest offset between the loggers."""
+"""Largest offset between the loggers (s), either way. By hand."""
 LEAST_SAMPLES = 1e-3
-"""Least offset that is tried, in samples."""
+"""Least offset that is tried, in samples; below it the correlation gives no start worth a fit. By hand."""
 
 
 def _read_shifted(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
+    """(n, c) from (n, c), read `offset` seconds earlier. `interpolated`: share (0 to 1) of linear interpolation with
+    which the logger read between its samples; the rest is band-limited."""
     return read_other_times(response, 1.0, -values["offset"] * sample_rate_hz, values.get("interpolated", 0.0))
 
 
@@ -32,6 +34,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _misfit(evidence: Evidence, values: Values) -> float:
+    """Sum of squared residuals, in units of the noise, of the shifted prediction over the samples in use."""
     read = _read_shifted(evidence.predicted, evidence.sample_rate_hz, (), values)
     return float(np.sum((((evidence.response - read) / evidence.noise) ** 2)[evidence.used > 0]))
 

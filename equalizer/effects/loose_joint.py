@@ -29,10 +29,10 @@ _FAST: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Spring force beyond the gap, averaged over the step, then as much friction as is needed to stop the motion, up to
     its limit."""
-    half, stiffness, slip = 0.5 * numbers[0], numbers[1], numbers[2]
+    half, stiffness, slip = 0.5 * parameters[0], parameters[1], parameters[2]
     spring = last = 0.0
     for way in (1.0, -1.0):
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half

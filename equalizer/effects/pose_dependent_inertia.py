@@ -16,12 +16,12 @@ LAGRANGE = 0.5
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Uses the step's mean acceleration, which depends on the force itself (implicit step)."""
     middle, speed = 0.5 * (at[X] + at[X_FREE]), 0.5 * (at[V] + at[V_FREE])
-    more = numbers[0] * middle
+    more = parameters[0] * middle
     free, per_newton = (at[V_FREE] - at[V]) / at[STEP_S], at[V_PER_N] / at[STEP_S]
-    return float(-(more * free + numbers[0] * numbers[1] * speed * speed) / max(1 + more * per_newton, 0.1))
+    return float(-(more * free + parameters[0] * parameters[1] * speed * speed) / max(1 + more * per_newton, 0.1))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:

@@ -13,10 +13,10 @@ from equalizer.signals.signal import FloatArray
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Friction at the step's mean position."""
     mean = 0.5 * (at[X] + at[X_FREE])
-    level = max(numbers[0] * (1 + numbers[1] * mean + numbers[2] * mean * mean), 0.0)
+    level = max(parameters[0] * (1 + parameters[1] * mean + parameters[2] * mean * mean), 0.0)
     return float(friction_force(level, level, memory[0], memory, at))
 
 

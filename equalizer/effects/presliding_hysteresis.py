@@ -16,12 +16,12 @@ BENDS = np.geomspace(3e-4, 1.0, 15)
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Dahl's bristle, deflected by the travel that its own force allows (implicit step). The force is weighted between
     the step's middle, exact for a soft bristle, and its end, stable for a stiff one. memory: deflection."""
-    if numbers[0] <= 0:
+    if parameters[0] <= 0:
         return 0.0
-    stiffness, longest, start = numbers[1], numbers[0] / numbers[1], memory[0]
+    stiffness, longest, start = parameters[1], parameters[0] / parameters[1], memory[0]
     slack = stiffness * at[X_PER_N]
     late = (0.5 + slack) / (1 + slack)
     allowed = at[X_FREE] - at[X]

@@ -12,14 +12,14 @@ from equalizer.signals.signal import FloatArray
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Mean of the drag at the step's start and end. The velocity at the end solves a quadratic equation (implicit
     step)."""
-    reach = 0.5 * numbers[0] * at[V_PER_N]
+    reach = 0.5 * parameters[0] * at[V_PER_N]
     aim = at[V_FREE] - reach * at[V] * abs(at[V])
     end = 2 * aim / (1 + np.sqrt(1 + 4 * reach * abs(aim)))
-    at[F_END] = -numbers[0] * end * abs(end)
-    return float(-0.5 * numbers[0] * (at[V] * abs(at[V]) + end * abs(end)))
+    at[F_END] = -parameters[0] * end * abs(end)
+    return float(-0.5 * parameters[0] * (at[V] * abs(at[V]) + end * abs(end)))
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:

@@ -18,11 +18,11 @@ _MORE = 1.2
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """Solve for the friction at the step's mean velocity, which itself depends on the force."""
     mean, force, start, last = at[V], 0.0, memory[0], -1.0
     for _ in range(3):
-        level = numbers[0] + (numbers[1] - numbers[0]) * np.exp(-((mean / numbers[2]) ** 2))
+        level = parameters[0] + (parameters[1] - parameters[0]) * np.exp(-((mean / parameters[2]) ** 2))
         if abs(level - last) <= 1e-6 * level:
             break
         last = level

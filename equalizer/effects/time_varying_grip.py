@@ -26,11 +26,11 @@ _LEAST_DENOMINATOR = 0.2
 
 
 @compile_law
-def _law(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The mean force over a step by the trapezoidal rule: F = -(d (v + v1) + k (x + x1)) / 2. The state x1, v1 at the
     end of the step is that without the force, plus the force times what 1 N adds."""
-    modulation = numbers[1] * np.sin(numbers[0] * (at[TIME_S] + 0.5 * at[STEP_S]) + numbers[2])
-    damping, stiffness = modulation * numbers[3], modulation * numbers[4]
+    modulation = parameters[1] * np.sin(parameters[0] * (at[TIME_S] + 0.5 * at[STEP_S]) + parameters[2])
+    damping, stiffness = modulation * parameters[3], modulation * parameters[4]
     force = -0.5 * (damping * (at[V] + at[V_FREE]) + stiffness * (at[X] + at[X_FREE]))
     return float(force / max(1 + 0.5 * (damping * at[V_PER_N] + stiffness * at[X_PER_N]), _LEAST_DENOMINATOR))
 

@@ -50,10 +50,12 @@ class EffectName:
 
     @property
     def main(self) -> EffectParameter:
+        """The parameter that measures the effect's strength, which comes first."""
         return self.parameters[0]
 
 
 def _required(name: str, unit: str, rotational: str = "") -> EffectParameter:
+    """A parameter that every file states; rotational: its unit in a rotational model, empty where it is the same."""
     return EffectParameter(name, unit, rotational or unit)
 
 
@@ -192,7 +194,7 @@ EFFECT_NAMES: tuple[EffectName, ...] = (
 )
 
 DISCOVERED_LAW = "discovered_law"
-"""A law without a name: a formula with free numbers p0, p1, …; see `equalizer.laws`. Its place follows from what it
+"""A law without a name: a formula with free parameters p0, p1, …; see `equalizer.laws`. Its place follows from what it
 acts on."""
 LAW_PLACES: dict[str, Place] = {"force": "mechanism", "command": "actuator", "response": "sensor"}
 """Place of a law, by what it acts on."""

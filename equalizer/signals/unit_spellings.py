@@ -89,7 +89,7 @@ def respell(text: str, known: Collection[str]) -> str:
 
 
 def nearest_unit(text: str, known: Collection[str]) -> str:
-    """The unit with each unknown symbol replaced by the nearest known one, and without a minus behind a stroke; empty
+    """The unit with each unknown symbol replaced by the nearest known one, and without a minus behind a slash; empty
     where a symbol has none."""
     plain = re.sub(
         r"(/[A-Za-z]+)\^-([1-9])", lambda under: under[1] + f"^{under[2]}".removesuffix("^1"), respell(text, known)

@@ -34,6 +34,7 @@ class Unit:
     """Only of a temperature that stands alone: in a product, `degC` is a difference."""
 
 
+# Decimal prefixes, and the symbols that take them: of others, such as `g` or `min`, a prefix would change the meaning.
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 _PREFIXABLE: dict[str, Dimension] = {
     "N": (1, 1, -2, 0, 0, 0),
@@ -182,14 +183,14 @@ _QUANTITY_OF = {
 
 
 def _parse_factors(text: str) -> list[tuple[str, int]]:
-    """Symbols with their exponents; what follows a stroke is divided by."""
+    """Symbols with their exponents; what follows a slash is divided by."""
     numerator, *denominators = text.replace("*", " ").split("/")
     found = [_parse_power(factor, 1, text) for factor in numerator.split()]
     for part in denominators:
         if len(part.split()) != 1:
-            raise _NotAUnitError(text, " (after each stroke stands exactly one symbol, as in N m s/rad or m/s/V)")
+            raise _NotAUnitError(text, " (after each slash stands exactly one symbol, as in N m s/rad or m/s/V)")
         if "-" in part:
-            raise _NotAUnitError(text, " (after a stroke an exponent has no minus, as in m/s^2)")
+            raise _NotAUnitError(text, " (after a slash an exponent has no minus, as in m/s^2)")
         found.append(_parse_power(part.strip(), -1, text))
     if not numerator.strip():
         raise _NotAUnitError(text, "")
@@ -255,6 +256,7 @@ def _is_known(text: str) -> bool:
     return True
 
 
+# The spelling of a product's SI unit: kg m/s^2 is shown as N, m/s/s as m/s^2.
 _PREFERRED: dict[Dimension, str] = {}
 for _text in ("N", "N m", "m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "V", "A", "s", "kg", "1"):
     _PREFERRED[parse_unit(_text).dimension] = _text

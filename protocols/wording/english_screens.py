@@ -1,5 +1,7 @@
 """English texts of the screens and of line mode. Keys in `_1` are for one thing, in `_n` for any other count."""
 
+# Names in braces are filled in by the screen, and a translation keeps them. German and Spanish texts count in the hash
+# of a protocol and stay as they are.
 SCREENS: dict[str, str] = {
     # Footer: what a key does. Short, because all keys of a screen stand in one line of 80 columns.
     "key_help": "Help",
@@ -50,7 +52,7 @@ SCREENS: dict[str, str] = {
     "bar_left": "about {minutes} min left",
     "runs_left_1": "1 run is left.",
     "runs_left_n": "{count} runs are left.",
-    "plan_training_runs_1": "There is some training first, then 1 run with rests between them.",
+    "plan_training_runs_1": "There is some training first, then 1 run.",
     "plan_training_runs_n": "There is some training first, then {count} runs with rests between them.",
     "plan_runs_1": "There is 1 run.",
     "plan_runs_n": "There are {count} runs.",

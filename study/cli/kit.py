@@ -28,7 +28,7 @@ def draw(
     ] = None,
 ) -> None:
     """Draw the order of the changes. The person who diagnoses must not see it."""
-    from analysis.evaluation.proof.lab_kit import CHANGES
+    from analysis.evaluation.blind_test.lab_kit import CHANGES
     from study.evaluation.kit.lab_kit import draw_labels
 
     labels = draw_labels(out, repeats, seed)

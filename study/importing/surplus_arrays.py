@@ -27,6 +27,7 @@ _RATE = re.compile(
 _STEP_WORDS = {"ts", "dt"}
 _USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
 _EVEN = 0.02
+"""Largest range of a clock's steps, relative to their median, for them to count as even."""
 SAME_CLOCK = 0.5
 """Stamps that differ by at most this fraction of a step, when both begin at 0, are one clock."""
 

@@ -20,6 +20,7 @@ UNEVEN = 0.02
 LEFT_OUT = 0.02
 """A uniform logger skips at most this fraction of its rows; more indicates rounded stamps."""
 _MOST_DECIMALS = 6
+"""Most decimals of a time stamp that are looked for: down to a microsecond where stamps are in seconds."""
 _BINARY = 1e-3
 """Tolerance of a decimal: deviation of a binary number that is the difference of large ones."""
 _USUAL_GAP = 3

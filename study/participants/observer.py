@@ -44,6 +44,8 @@ class Observer(Protocol):
     session gets the same replies as an uninterrupted one."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The name that `--observer` takes."""
 
-    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply: ...
+    def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
+        """The reply to this stimulus. seed: of the session; with the stimulus's place in it, it gives all draws."""

@@ -44,6 +44,7 @@ def find_observer(name: str, seed: int) -> Observer:
     typical = DirectionFeeler(known, TYPICAL_THRESHOLDS_N)
     observers: dict[str, Observer] = {
         "ideal": typical,
+        # One trial in ten without attention: half of these random answers are right.
         "lapsing": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, lapse=0.05),
         "biased": DirectionFeeler(known, TYPICAL_THRESHOLDS_N, criterion=-0.5),
         "guesser": Guesser(known),

@@ -13,6 +13,7 @@ from textual.app import App
 from study.errors import ExitCode
 
 LOOK_EVERY_S = 0.5
+"""Interval at which the terminal is looked at (s)."""
 LAST_RESORT_S = 10.0
 """Longer than the engine ever takes to end. Writing to a closed terminal may block forever."""
 

@@ -1,7 +1,10 @@
 """Static nonlinearities of an actuator, with their parameters on grids that span the amplitudes of the command.
 
 Laws of the motion are columns beside the commanded force; these change the force itself, so that they are tested in
-the inverted balance; see `actuator`.
+the balance solved for the acceleration (`inverse_balance`). All constants below are set by hand: a grid need only be so
+fine that the best of its laws is refined to the true one (`neighbours_of`).
+
+Reference: Slotine and Li, Applied Nonlinear Control (1991), chapter 5 (dead zone, saturation, relay).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,8 +35,9 @@ over the travel. A magnet held by a spring stays within a third of the gap, whic
 REFINING_FACTORS = (0.95, 0.98, 1.02, 1.05)
 """Factors on a parameter in a coordinate search."""
 REFINED_PARAMETERS = ("width", "limit", "square", "gap", "power", "rate")
+"""Parameters on a grid; others are switches or scales."""
 RATES = 20
-"""Number of slew limits that are tried."""
+"""Number of slew limits that are tried, in a geometric series."""
 NODE_QUANTILES = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
 """Quantiles at which a piecewise linear function has its nodes; at those of the command's size it may jump, too."""
 
@@ -59,10 +63,11 @@ class CommandLaw:
 
     @property
     def sloped(self) -> int:
+        """See `inverse_balance.ForceOfCommand`."""
         return 1
 
     def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
-        """command, position: (n,) each."""
+        """(n, weights): the columns at command and position (n,) each, in the units of a force where it has a scale."""
         columns = self.scale * self.columns(command, self.values)
         return columns if self.factor_at is None else columns * self.factor_at(position, self.values)[:, None]
 
@@ -164,6 +169,7 @@ def _power_force(command: FloatArray, of: dict[str, float]) -> FloatArray:
 
 
 def _sizes(size: FloatArray, shares: Sequence[float]) -> list[float]:
+    """Quantiles of the command's size (n,) above zero and below its largest, ascending and each once."""
     found = np.unique(np.quantile(size, shares))
     return [float(value) for value in found if 0 < value < size.max()]
 

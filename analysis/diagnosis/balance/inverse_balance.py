@@ -66,6 +66,7 @@ class InverseBalance:
         return cast(list[float], list(self.map_(partial(self.total_error, beside=beside), laws)))
 
     def total_error(self, law: CommandLaw, beside: Sequence[int]) -> float:
+        """Cross-validated sum of squares of one law of the command, beside these laws of the motion."""
         return float(self.errors(law, beside, False).sum())
 
     def least_error(self, law: ForceOfCommand, beside: Sequence[int]) -> float:
@@ -115,6 +116,8 @@ class InverseBalance:
         return [speed**2 > least for speed in speeds]
 
     def _rows(self, law: ForceOfCommand, laws: Sequence[int]) -> list[FloatArray]:
+        """Per motion the regression's columns (n, columns): the law's, their rates of change, the other axes' commands,
+        and the laws of the motion."""
         regression, found = self.search.regression, []
         # Filters of the quantity that it is solved for would reproduce it.
         filters = {self.solved, *range(regression.matrices, regression.base - 1)}

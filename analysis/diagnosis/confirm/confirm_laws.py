@@ -222,7 +222,7 @@ def open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
 def _open_parameters(result: SearchResult) -> list[int]:
     """Positive parameters of the laws, in their order, whose intervals reach zero."""
     assert result.errors is not None
-    numbers = result.found.steps[-1].fitted.hypothesis.numbers
+    numbers = result.found.steps[-1].fitted.hypothesis.parameters
     errors = result.errors[len(result.context.tuning.names) :]
     return [
         place

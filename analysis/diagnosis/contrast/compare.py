@@ -33,7 +33,7 @@ from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
-from analysis.diagnosis.contrast.try_faults import ALL, Trial, Tried, allowed_sizes, try_faults
+from analysis.diagnosis.contrast.try_faults import ALL, TriedFaults, TriedVariant, allowed_sizes, try_faults
 from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
 from analysis.diagnosis.settings import (
     BALANCE_HOLDS,
@@ -101,7 +101,7 @@ def _set_up(
     return compared_bases, faults
 
 
-def _judge_faults(compared_bases: Sequence[ComparedBase], trial: Trial) -> Comparison:
+def _judge_faults(compared_bases: Sequence[ComparedBase], trial: TriedFaults) -> Comparison:
     bare = trial.bare
     plain = fit_sizes(bare, None)
     own = sum(compared.faulty.count for compared in compared_bases)
@@ -121,7 +121,7 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], trial: Trial) -> Compa
     )  # fmt: skip
 
 
-def _balances(compared_bases: Sequence[ComparedBase], tried: Sequence[Tried]) -> bool:
+def _balances(compared_bases: Sequence[ComparedBase], tried: Sequence[TriedVariant]) -> bool:
     """Whether the force balance fits the faulty set, with nothing or with the best fault undone. tried: the best
     first."""
     device = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
@@ -135,7 +135,7 @@ def _balances(compared_bases: Sequence[ComparedBase], tried: Sequence[Tried]) ->
     )
 
 
-def _undo(compared: ComparedBase, found: Tried) -> tuple[list[FloatArray], list[Mask]]:
+def _undo(compared: ComparedBase, found: TriedVariant) -> tuple[list[FloatArray], list[Mask]]:
     """The rows of the faulty set with a fault undone, and those of which something is left."""
     fit, fault, variant, _ = found
     changed = rows_with_fault_undone(compared, compared.faulty, fault, variant)
@@ -159,7 +159,7 @@ def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
         yield together / max(apart, 1e-300) - 1
 
 
-def _judge_fault(compared_bases: Sequence[ComparedBase], found: Tried, plain: Fit, samples: int) -> JudgedFault:
+def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, plain: Fit, samples: int) -> JudgedFault:
     fit, fault, variant, pairs = found
     values = variant.values(fit.sizes)
     apart = _leave_out_blocks(pairs)

@@ -1,7 +1,14 @@
-"""Finds for each fault the variant and the size with the smallest error after undoing it."""
+"""Finds for each fault the variant and the size with the smallest error after undoing it.
+
+A fault of unknown size s changes the recording by s times a known column where it is small, and otherwise only near the
+size about which it was linearised. Each variant (axis, sign, corner frequency) is undone by least squares over its
+sizes, jointly with the parameters of the sound device; the best are linearised again about the size that was found, a
+Gauss-Newton iteration whose step is judged by the error.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from analysis.diagnosis.contrast.compared_base import ComparedBase, rows_with_fault_undone
 from analysis.diagnosis.contrast.fault import Fault, Variant, fix_size
@@ -10,33 +17,43 @@ from analysis.diagnosis.settings import CONTRAST_BLOCKS, SIZE_IS_NEAR, UNDOING_R
 from analysis.diagnosis.types import TimeBudget
 
 ALL = tuple(range(CONTRAST_BLOCKS))
+"""Numbers of all blocks into which the samples are divided for cross-validation."""
 VARIANTS_APPROACHED = 3
-"""Number of variants of a fault that are linearised again about their best sizes."""
+"""Number of variants of a fault that are linearised again about their best sizes; each takes as long as a first try. By
+hand."""
 
-Tried = tuple[Fit, Fault, Variant, list[Pair]]
-"""A variant of a fault with its best size."""
+
+class TriedVariant(NamedTuple):
+    """A variant of a fault, undone at its best size."""
+
+    fit: Fit
+    """Sizes, and the error that is left."""
+    fault: Fault
+    variant: Variant
+    pairs: list[Pair]
+    """Per base, the least-squares products of both sets with the fault undone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trial:
+class TriedFaults:
     """Result of trying faults: each with its best variant and size, beside the products with nothing undone."""
 
     bare: list[Pair]
     """Per base, the products of both sets with nothing undone."""
-    tried: list[Tried]
+    tried: list[TriedVariant]
     """Each fault by its best variant; the one that leaves least first."""
     complete: bool
     """Whether all faults were tried before the time ran out."""
 
 
-def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], time_left: TimeBudget) -> Trial:
+def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], time_left: TimeBudget) -> TriedFaults:
     """Tries every fault on all compared_bases, in order, until the time runs out."""
     clean = [compared.grams(compared.clean, []).blocks for compared in compared_bases]
     bare = [
         Pair(compared.grams(compared.faulty, []), ALL, tuple(own), (compared.clean.scale / compared.faulty.scale) ** 2)
         for compared, own in zip(compared_bases, clean, strict=True)
     ]
-    best: list[Tried] = []
+    best: list[TriedVariant] = []
     complete = False
     for fault in faults:
         if not time_left():
@@ -46,12 +63,12 @@ def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], 
             best.append(_best_of(tried, bare, compared_bases))
     else:
         complete = True
-    return Trial(bare, sorted(best, key=_error_of), complete)
+    return TriedFaults(bare, sorted(best, key=_error_of), complete)
 
 
 def _try_variant(
     bare: Sequence[Pair], compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant
-) -> Tried | None:
+) -> TriedVariant | None:
     """Undo the fault by this variant and measure what error remains; None where undoing it is ill-conditioned. bare:
     the pairs with nothing undone."""
     pairs = [
@@ -62,24 +79,26 @@ def _try_variant(
         for compared, pair in zip(compared_bases, bare, strict=True)
     ]
     well_conditioned = all(pair.with_it.is_well_conditioned(variant) for pair in pairs)
-    return (fit_sizes(pairs, variant), fault, variant, pairs) if well_conditioned else None
+    return TriedVariant(fit_sizes(pairs, variant), fault, variant, pairs) if well_conditioned else None
 
 
-def _error_of(tried: Tried) -> float:
-    return tried[0].error
+def _error_of(tried: TriedVariant) -> float:
+    return tried.fit.error
 
 
-def _best_of(tried: Sequence[Tried], bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]) -> Tried:
+def _best_of(
+    tried: Sequence[TriedVariant], bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]
+) -> TriedVariant:
     """The variant with the smallest error, after linearisation about its size. Of faults that are valid at size 1 only,
     several are kept, because at another size any of them may have a smaller error than the true one."""
     first = min(tried, key=_error_of)
-    if not first[2].exact:
+    if not first.variant.exact:
         return _approach(first, bare, compared_bases)
     at_size_1 = sorted(tried, key=lambda each: _error_of(_fit_allowed_size(each)))[:VARIANTS_APPROACHED]
     return min((_approach(each, bare, compared_bases) for each in (first, *at_size_1)), key=_error_of)
 
 
-def _approach(found: Tried, bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]) -> Tried:
+def _approach(found: TriedVariant, bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]) -> TriedVariant:
     """The fault linearised repeatedly about the size that was found: far from it, the change is only extrapolated."""
     best = _fit_allowed_size(found)
     for _ in range(UNDOING_ROUNDS):
@@ -96,9 +115,12 @@ def _approach(found: Tried, bare: Sequence[Pair], compared_bases: Sequence[Compa
     return best
 
 
-def _fit_allowed_size(found: Tried) -> Tried:
+def _fit_allowed_size(found: TriedVariant) -> TriedVariant:
+    """The variant at the best of its allowed sizes."""
     _, fault, variant, pairs = found
-    return (fit_sizes(pairs, allowed_sizes(variant)), fault, variant, pairs) if variant.exact else found
+    if not variant.exact:
+        return found
+    return TriedVariant(fit_sizes(pairs, allowed_sizes(variant)), fault, variant, pairs)
 
 
 def allowed_sizes(variant: Variant) -> Variant:

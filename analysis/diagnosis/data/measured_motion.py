@@ -11,6 +11,7 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
+# Quantities that push; a recording whose response is one of them was driven by an imposed motion.
 _FORCES = frozenset({"force", "torque"})
 
 FREE = "free"
@@ -35,7 +36,8 @@ def has_motion(recording: Recording, model: MechanicalModel) -> bool:
 
 
 def measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFloor) -> MeasuredMotion:
-    """The position where it was measured, else the response; see `has_motion`."""
+    """The position where it was measured, else the response: a velocity is integrated by the trapezoidal rule, and its
+    noise divided by (2 pi f)². floor: noise of the recording. See `has_motion`."""
     m, rate_hz = model.inputs, recording.sample_rate_hz
     if _has_position(recording, model):
         assert recording.position is not None
@@ -45,6 +47,7 @@ def measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFl
     density = floor.response.density[:, :m]
     if DERIVATIVE_OF_QUANTITY[model.quantity] == 0:
         return MeasuredMotion(samples, density)
+    # Below one period per recording there is no line: the division by f² stops there.
     slowest = np.maximum(floor.frequency_hz, rate_hz / len(recording))[:, None]
     moved = np.zeros(samples.shape)
     moved[1:] = np.cumsum(samples[1:] + samples[:-1], axis=0) / (2 * rate_hz)

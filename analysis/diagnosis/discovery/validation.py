@@ -164,7 +164,7 @@ def does_as_well_with_less(context: SearchContext, of: Discovery, rival: FittedC
     law = of.found.after
     sums = [each for found in of.rounds for each in (found.sums[0], found.sums[0].partner) if each is not None]
     numbers = sum(1 + len(term.numbers) for each in sums for term in each.terms)
-    if numbers >= len(rival.fitted.hypothesis.numbers) or not inseparable(rival, law):
+    if numbers >= len(rival.fitted.hypothesis.parameters) or not inseparable(rival, law):
         return False
     behind = held_out_gain(context.whole, law, rival)
     worse = np.mean(np.log(law.score.test)) - np.mean(np.log(rival.score.test))

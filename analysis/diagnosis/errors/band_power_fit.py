@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.errors.band_power import BandPower
-from analysis.diagnosis.errors.hypothesis import Hypothesis, Number
+from analysis.diagnosis.errors.hypothesis import FreeParameter, Hypothesis
 from analysis.diagnosis.errors.output_error import bounded_step
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.types import Mapper
@@ -127,19 +127,19 @@ def fit_band_power(view: View, start: BandPowerFit, rounds: int) -> BandPowerFit
 
 def hypothesis_columns(view: View, at: BandPowerFit) -> FloatArray:
     """(parameters, stretches, bands, c): sensitivity to the hypothesis's parameters, by central differences."""
-    numbers = at.hypothesis.numbers
-    jobs = [(number, way) for number in range(len(numbers)) for way in (1.0, -1.0)]
+    parameters = at.hypothesis.parameters
+    jobs = [(number, way) for number in range(len(parameters)) for way in (1.0, -1.0)]
 
     def moved(job: tuple[int, float]) -> FloatArray:
         number, way = job
         point = at.hypothesis.point.copy()
-        point[number] += way * _move(numbers[number])
+        point[number] += way * _move(parameters[number])
         return view.predict(at.deviations, replace(at.hypothesis, point=point))
 
     there: list[FloatArray] = list(view.map_(moved, jobs))  # type: ignore[arg-type]
     return np.array(
-        [(up - down) / (2 * _move(number)) for number, up, down in zip(numbers, there[::2], there[1::2], strict=True)]
-    ).reshape(len(numbers), *at.predicted.shape)
+        [(up - down) / (2 * _move(free)) for free, up, down in zip(parameters, there[::2], there[1::2], strict=True)]
+    ).reshape(len(parameters), *at.predicted.shape)
 
 
 def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
@@ -175,12 +175,12 @@ def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
     """(parameters,): standard errors from the information matrix, with the information attributed to chance
     subtracted. What is left is scaled in rows and columns alike: subtracted from the diagonal alone, the rest of the
     matrix would no longer be positive definite where parameters are correlated."""
-    numbers = at.hypothesis.numbers
-    first = len(products) - len(numbers)
+    parameters = at.hypothesis.parameters
+    first = len(products) - len(parameters)
     chance = _weight(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))
     share = np.ones(len(products))
-    for k, number in enumerate(numbers, start=first):
-        by_chance = float(chance @ chance) / (2 * view.ensemble * _move(number) ** 2)
+    for k, free in enumerate(parameters, start=first):
+        by_chance = float(chance @ chance) / (2 * view.ensemble * _move(free) ** 2)
         share[k] -= min(by_chance / max(float(products[k, k]), 1e-300), MOST_BY_CHANCE)
     values, vectors = np.linalg.eigh(products * np.sqrt(np.outer(share, share)))
     values = np.maximum(values, max(1e-9 * float(values[-1]), LEAST_KNOWN))
@@ -189,18 +189,19 @@ def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
 
 
 def _step_bounds(at: BandPowerFit, t: int) -> tuple[FloatArray, FloatArray]:
-    numbers = at.hypothesis.numbers
-    most = np.array([LONGEST_STEP if number.parameter.scale == "log" else 2 * _move(number) for number in numbers])
-    bounds = np.array([number.bounds for number in numbers]).reshape(-1, 2) - at.hypothesis.point[:, None]
+    parameters = at.hypothesis.parameters
+    most = np.array([LONGEST_STEP if free.parameter.scale == "log" else 2 * _move(free) for free in parameters])
+    bounds = np.array([free.bounds for free in parameters]).reshape(-1, 2) - at.hypothesis.point[:, None]
     low = np.concatenate([-3.0 - at.deviations[:t], np.clip(bounds[:, 0], -most, 0.0)])
     high = np.concatenate([3.0 - at.deviations[:t], np.clip(bounds[:, 1], 0.0, most)])
     return low, high
 
 
-def _move(number: Number) -> float:
-    if number.parameter.scale != "log":
-        return number.move
-    return float(np.clip(WIDEST * number.move, *MOVES))
+def _move(free: FreeParameter) -> float:
+    """Step of the finite differences, in the parameter's coordinate."""
+    if free.parameter.scale != "log":
+        return free.move
+    return float(np.clip(WIDEST * free.move, *MOVES))
 
 
 def _huber(off: FloatArray) -> FloatArray:

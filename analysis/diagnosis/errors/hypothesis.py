@@ -18,44 +18,44 @@ class Claim:
 
     effect: Effect
     spread: Spread
-    sites: tuple[int, ...]
     """How sites share parameters: one site; all with the same; each with its own."""
+    sites: tuple[int, ...]
+    """Numbers of the axes or channels, from 0."""
 
     @property
     def groups(self) -> int:
         """Number of sets of the effect's parameters."""
         return len(self.sites) if self.spread == "each" else 1
 
-    @property
-    def numbers(self) -> int:
-        return self.groups * len(self.effect.parameters)
-
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class FreeParameter:
     """A free parameter of a hypothesis, as a coordinate that a fit can step along."""
 
     parameter: Parameter
     unit: float
-    """Unit of the coordinate where it is not logarithmic."""
+    """Value of one step of the coordinate where it is not logarithmic."""
 
     def value(self, coordinate: float) -> float:
+        """The parameter's value (SI) at a coordinate, within its limits."""
         p = self.parameter
         value = float(np.exp(min(coordinate, 700.0))) if p.scale == "log" else coordinate * self.unit
         return min(max(value, p.lower), p.upper)
 
     def coordinate(self, value: float) -> float:
+        """The coordinate of a value (SI): its logarithm on a log scale, else the value over `unit`."""
         p = self.parameter
         inside = min(max(value, p.lower), p.upper)
         return float(np.log(inside)) if p.scale == "log" else inside / self.unit
 
     @property
     def move(self) -> float:
-        """Step of the finite differences."""
+        """Step of the finite differences, in the coordinate."""
         return 1.0 if self.parameter.scale == "linear" else self.parameter.step
 
     @property
     def bounds(self) -> tuple[float, float]:
+        """Lower and upper limit of the coordinate."""
         return self.coordinate(self.parameter.lower), self.coordinate(self.parameter.upper)
 
 
@@ -67,22 +67,28 @@ class Hypothesis:
     starts: tuple[Values, ...]
     """Per group of each claim: values that stay fixed, and the scale of those that may have either sign."""
     point: FloatArray
-    """The free parameters, claim by claim, group by group: logarithms on a log scale, else in steps or scales."""
+    """(k,): coordinates of the free parameters, claim by claim, group by group (`FreeParameter.coordinate`)."""
 
     @property
     def key(self) -> tuple[tuple[str, str, tuple[int, ...]], ...]:
+        """Effect, spread and sites of each claim: the same for hypotheses that differ in parameters alone."""
         return tuple((claim.effect.name, claim.spread, claim.sites) for claim in self.claims)
 
     @property
-    def numbers(self) -> tuple[Number, ...]:
-        """One parameter per coordinate of the point."""
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        """The free parameters, one per coordinate of the point."""
         groups = [claim.effect.parameters for claim in self.claims for _ in range(claim.groups)]
         return tuple(
-            Number(p, _unit(p, start)) for of, start in zip(groups, self.starts, strict=True) for p in of if not p.fixed
+            FreeParameter(p, _unit(p, start))
+            for of, start in zip(groups, self.starts, strict=True)
+            for p in of
+            if not p.fixed
         )
 
     def placed_effects(self, point: FloatArray | None = None) -> tuple[PlacedEffect, ...]:
-        left = list(self.numbers)
+        """The effects with their values, one per claim and group, as a simulation takes them. point: (k,) coordinates;
+        None = the hypothesis's own."""
+        left = list(self.parameters)
         coordinates = list(self.point if point is None else point)
         effects: list[PlacedEffect] = []
         starts = iter(self.starts)
@@ -126,16 +132,16 @@ def move_point(hypothesis: Hypothesis, step: FloatArray, straight: bool) -> Hypo
     makes up for one of the effect (two masses), steps of logarithms leave the valley's floor."""
     if not straight:
         return replace(hypothesis, point=hypothesis.point + step)
-    logarithmic = np.array([number.parameter.scale == "log" for number in hypothesis.numbers], dtype=np.bool_)
+    logarithmic = np.array([free.parameter.scale == "log" for free in hypothesis.parameters], dtype=np.bool_)
     by = np.where(logarithmic, np.log1p(np.maximum(step, -0.9)), step)
-    low, high = np.array([number.bounds for number in hypothesis.numbers]).reshape(-1, 2).T
+    low, high = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2).T
     return replace(hypothesis, point=np.clip(hypothesis.point + by, low, high))
 
 
 def hypothesis_of_claim(claim: Claim, values: Sequence[Values]) -> Hypothesis:
     """A hypothesis of one claim. values: one set per group."""
     free = [(p, of_group) for of_group in values for p in claim.effect.parameters if not p.fixed]
-    point = np.array([Number(p, _unit(p, of_group)).coordinate(of_group[p.name]) for p, of_group in free])
+    point = np.array([FreeParameter(p, _unit(p, of_group)).coordinate(of_group[p.name]) for p, of_group in free])
     return Hypothesis((claim,), tuple(dict(of_group) for of_group in values), point)
 
 
@@ -151,12 +157,12 @@ NOTHING = Hypothesis((), (), np.zeros(0))
 
 def similar_hypotheses(whole: Hypothesis) -> Iterator[Hypothesis]:
     """The hypothesis with other parameters that have almost the same effect, one effect at a time."""
-    numbers, begin = whole.numbers, 0
+    parameters, begin = whole.parameters, 0
     for placed in whole.placed_effects():
         end = begin + sum(not p.fixed for p in placed.effect.parameters)
         for other in placed.effect.alike(placed.values):
             point = whole.point.copy()
-            point[begin:end] = [number.coordinate(other[number.parameter.name]) for number in numbers[begin:end]]
+            point[begin:end] = [free.coordinate(other[free.parameter.name]) for free in parameters[begin:end]]
             yield replace(whole, point=point)
         begin = end
 

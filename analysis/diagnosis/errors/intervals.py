@@ -79,7 +79,7 @@ def sensitivity_to_all(
         return np.asarray((before - after) / (high - low))
 
     samples = sum(int(record.fit.sum()) * record.measured.shape[1] for record in measure.records)
-    count = t + len(hypothesis.numbers)
+    count = t + len(hypothesis.parameters)
     columns = np.array(list(map_(column, range(count)))).reshape(count, samples)
     return Sensitivity(deviations, columns, columns @ columns.T)
 
@@ -88,8 +88,8 @@ def _both_ways(hypothesis: Hypothesis, number: int, finer: float) -> tuple[float
     """Steps down and up within the bounds. number: of the hypothesis; below 0: of the model."""
     if number < 0:
         return -finer * DIFFERENCE_STEP, finer * DIFFERENCE_STEP
-    (low, high), at = hypothesis.numbers[number].bounds, hypothesis.point[number]
-    step = finer * hypothesis.numbers[number].move
+    (low, high), at = hypothesis.parameters[number].bounds, hypothesis.point[number]
+    step = finer * hypothesis.parameters[number].move
     return max(-step, low - at), min(step, high - at)
 
 
@@ -186,7 +186,7 @@ def _segments(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
 
 def _free(fitted: Fitted) -> Mask:
     """(t + parameters,): whether a parameter is not at one of its bounds; the model's parameters always count."""
-    point, ends = fitted.hypothesis.point, [number.bounds for number in fitted.hypothesis.numbers]
+    point, ends = fitted.hypothesis.point, [free.bounds for free in fitted.hypothesis.parameters]
     away = [not np.isclose(at, of, rtol=0.0, atol=AT_AN_END).any() for at, of in zip(point, ends, strict=True)]
     return np.array([True] * len(fitted.deviations) + away, dtype=np.bool_)
 

@@ -254,7 +254,7 @@ def hypothesis_sensitivity(
 ) -> FloatArray:
     """(parameters, samples): sensitivity of the prediction to the hypothesis's parameters."""
     model: MechanicalModel = tuning.tune(from_.deviations)
-    moves = [number.move for number in from_.hypothesis.numbers]
+    moves = [free.move for free in from_.hypothesis.parameters]
 
     def moved(number: int) -> FloatArray:
         point, move = from_.hypothesis.point.copy(), moves[number]
@@ -269,13 +269,13 @@ def hypothesis_sensitivity(
 
 
 def _bounds(hypothesis: Hypothesis, tuned: int) -> tuple[FloatArray, FloatArray]:
-    own = np.array([number.bounds for number in hypothesis.numbers]).reshape(-1, 2)
+    own = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2)
     widest = np.full(tuned, RETUNING_BOUND)
     return np.concatenate([-widest, own[:, 0]]), np.concatenate([widest, own[:, 1]])
 
 
 def _longest(hypothesis: Hypothesis) -> FloatArray:
-    return np.array([LARGEST_STEPS[number.parameter.scale] for number in hypothesis.numbers])
+    return np.array([LARGEST_STEPS[free.parameter.scale] for free in hypothesis.parameters])
 
 
 def bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

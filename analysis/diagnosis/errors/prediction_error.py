@@ -22,7 +22,9 @@ class ChannelRms:
     name: str
     unit: str
     signal: float
+    """Standard deviation of the measured signal."""
     left: float
+    """Rms of the prediction error."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,6 +34,7 @@ class PredictionError:
     error: str
     """Name of the error measure."""
     as_it_is: float | None
+    """The error of the model without any gain factor."""
     with_gain: float | None
     """The error with one gain factor for all channels, fitted to the samples that are not tested, or to all."""
     channels: tuple[ChannelRms, ...]
@@ -69,6 +72,8 @@ def _channels(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[Ch
 
 
 def _gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
+    """Least-squares gain from prediction f to measurement y, (n, c) each, every channel in units of its rms; None where
+    the prediction is zero or not finite."""
     size = np.maximum(np.sqrt(np.mean(y[mask] ** 2, axis=0)), np.finfo(float).tiny)
     predicted, measured = (f[mask] / size).ravel(), (y[mask] / size).ravel()
     power = float(predicted @ predicted)
@@ -76,6 +81,7 @@ def _gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
 
 
 def _share(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
+    """Normalised rms error of prediction f of y, (n, c) each: sqrt(mean over channels of (rms error / std of y)²)."""
     if not mask.any():
         return None
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,8 +1,15 @@
 """Error measure with prewhitened residuals, and its whitening filter.
 
-The whitened residual is the one-step prediction error of an AR(p) model, fitted by Yule-Walker (Yule 1927, Walker 1931)
-to the residual that a re-tuned model leaves on reference recordings: each frequency is weighted by the inverse of that
-residual's spectrum.
+The whitened residual is the one-step prediction error of an AR(p) model of the residual r that a re-tuned model leaves
+on reference recordings,
+
+    w(t) = r(t) + a1 r(t-1) + ... + ap r(t-p),        R a = -[R(1) ... R(p)]        (Yule-Walker)
+
+with the autocovariance R(k) = E r(t) r(t-k) and its Toeplitz matrix R. |A|² of the filter is the inverse of the
+residual's spectrum: what the re-tuned model misses everywhere counts little, what it never missed counts much.
+
+References: Yule, Phil. Trans. R. Soc. A 226 (1927), 267; Walker, Proc. R. Soc. A 131 (1931), 518; Ljung, System
+Identification (1999), section 7.2 (prefiltering of prediction errors).
 """
 
 from collections.abc import Sequence
@@ -23,49 +30,54 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 MOST_LAGS, SAMPLES_PER_LAG = 64, 50
-"""Largest order of the autoregression, and least samples per lag."""
+"""Largest order p of the autoregression, and least samples per lag: fewer make the coefficients noise. By hand."""
 FLAT = 1e-4
-"""White noise added to the power, as a share of it: bounds the weight of any frequency."""
+"""White noise added to the residual before the fit, as a share of its power: no frequency weighs more than 1 / FLAT
+times what it would in a flat spectrum of this power, and the Toeplitz matrix stays well conditioned."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WhiteningFilter:
     """A causal FIR filter per channel, which makes the reference residual white."""
 
-    steps: FloatArray
-    """(lags + 1, c): the whitening filter, the first row 1."""
+    coefficients: FloatArray
+    """(lags + 1, c): impulse response, 1 and then a1 ... ap."""
 
     @property
     def lags(self) -> int:
-        return len(self.steps) - 1
+        """Order p of the autoregression."""
+        return len(self.coefficients) - 1
 
-    def apply(self, left: FloatArray) -> FloatArray:
-        """(n, c): residuals through the causal filter; unknown samples count as 0 and stay NaN."""
-        known = np.isfinite(left)
-        filled = np.where(known, left, 0.0)
-        room = next_fast_len(len(left) + self.lags, True)
-        passed = irfft(rfft(filled, room, axis=0) * rfft(self.steps, room, axis=0), room, axis=0)
-        return np.where(known, passed[: len(left)], np.nan)
+    def apply(self, residual: FloatArray) -> FloatArray:
+        """(n, c): the residual (n, c) through the causal filter; unknown samples count as 0 and stay NaN."""
+        known = np.isfinite(residual)
+        filled = np.where(known, residual, 0.0)
+        # Padded by the filter's length, so that the circular convolution of the FFT is a linear one.
+        padded = next_fast_len(len(residual) + self.lags, True)
+        filtered = irfft(rfft(filled, padded, axis=0) * rfft(self.coefficients, padded, axis=0), padded, axis=0)
+        return np.where(known, filtered[: len(residual)], np.nan)
 
-    def warm(self, left: FloatArray) -> Mask:
-        """(n,): mask of the samples for which all samples that the filter uses are known."""
-        unknown = np.concatenate([np.ones(self.lags), ~np.isfinite(left).all(axis=1)])
+    def has_full_history(self, residual: FloatArray) -> Mask:
+        """(n,): mask of the samples of a residual (n, c) for which all samples that the filter uses are known."""
+        unknown = np.concatenate([np.ones(self.lags), ~np.isfinite(residual).all(axis=1)])
         until = np.concatenate([[0.0], np.cumsum(unknown)])
-        return np.asarray(until[self.lags + 1 :] == until[: len(left)], dtype=np.bool_)
+        return np.asarray(until[self.lags + 1 :] == until[: len(residual)], dtype=np.bool_)
 
 
 def whitening_filter(residuals: Sequence[FloatArray], least: FloatArray) -> WhiteningFilter:
-    """Autoregression fitted to residuals by Yule-Walker. residuals: (n, c) each, NaN where not known. least: (c,), rms
-    of white noise, which bounds the spectrum from below."""
+    """Autoregression fitted to residuals by Yule-Walker, channel by channel. residuals: (n, c) each, NaN where not
+    known. least: (c,), rms of white noise in the residuals' unit, which bounds the spectrum from below."""
     count = sum(int(np.isfinite(residual).all(axis=1).sum()) for residual in residuals)
     lags = int(np.clip(count // SAMPLES_PER_LAG, 1, MOST_LAGS))
-    alike: FloatArray = np.sum([lagged_products(residual, lags) for residual in residuals], axis=0) / max(count, 1)
-    alike[0] = alike[0] * (1 + FLAT) + least**2
-    steps = np.zeros((lags + 1, len(least)))
-    steps[0] = 1.0
-    for c, row in enumerate(alike.T):
-        steps[1:, c] = -solve_toeplitz(row[:-1], row[1:])
-    return WhiteningFilter(steps)
+    autocovariance: FloatArray = np.sum([lagged_products(residual, lags) for residual in residuals], axis=0) / max(
+        count, 1
+    )
+    autocovariance[0] = autocovariance[0] * (1 + FLAT) + least**2
+    coefficients = np.zeros((lags + 1, len(least)))
+    coefficients[0] = 1.0
+    for c, row in enumerate(autocovariance.T):
+        coefficients[1:, c] = -solve_toeplitz(row[:-1], row[1:])
+    return WhiteningFilter(coefficients)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +87,7 @@ class WhitenedMeasure:
     plain: ErrorMeasure
     whitening: WhiteningFilter
     unit: FloatArray
+    """(c,): what a whitened residual is divided by: the noise, and with a floor its root sum of squares with it."""
     noise: FloatArray
     """(c,): rms of the whitened residual of the reference recordings, in each channel's own unit."""
     least: float = 0.0
@@ -101,8 +114,9 @@ class WhitenedMeasure:
         return self.plain.can_observe(effect)
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        left = self.plain.residuals(model, effects)
-        return tuple(self.whitening.apply(residual * self.plain.unit) / self.unit for residual in left)
+        plain = self.plain.residuals(model, effects)
+        # The filter was fitted to residuals in the channels' units, those of the plain measure are in units of noise.
+        return tuple(self.whitening.apply(residual * self.plain.unit) / self.unit for residual in plain)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
@@ -113,10 +127,10 @@ class WhitenedMeasure:
 
 def whiten_measure(plain: ErrorMeasure, whitening: WhiteningFilter, noise: FloatArray) -> WhitenedMeasure:
     """The measure with whitened residuals. noise: (c,), see `WhitenedMeasure`."""
-    warm = [_leave_out_warm_up(record, whitening) for record in plain.records]
-    return WhitenedMeasure(plain.with_records(tuple(warm)), whitening, noise, noise)
+    records = tuple(_leave_out_warm_up(record, whitening) for record in plain.records)
+    return WhitenedMeasure(plain.with_records(records), whitening, noise, noise)
 
 
 def _leave_out_warm_up(record: Observed, whitening: WhiteningFilter) -> Observed:
-    warm = whitening.warm(record.measured)
-    return replace(record, fit=record.fit & warm, choose=record.choose & warm, test=record.test & warm)
+    full = whitening.has_full_history(record.measured)
+    return replace(record, fit=record.fit & full, choose=record.choose & full, test=record.test & full)

@@ -41,8 +41,8 @@ class StructureRefused(ValueError):  # noqa: N818 - an answer that a user reads
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
-    """A number of a fitted model with its confidence interval."""
+class ParameterEstimate:
+    """A parameter of a fitted model with its confidence interval."""
 
     name: str
     unit: str
@@ -57,7 +57,7 @@ class StructureFit:
 
     kind: Kind
     model: MechanicalModel
-    numbers: tuple[Number, ...]
+    parameters: tuple[ParameterEstimate, ...]
     held_out: tuple[float, ...]
     """Per axis or response channel: rms of the held-out error over that of the signal."""
     channels: tuple[str, ...]
@@ -120,7 +120,7 @@ def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
     return StructureFit(
         kind,
         model,
-        _numbers(given, fit, (model.system, parts)),
+        _parameter_estimates(given, fit, (model.system, parts)),
         tuple(fit.held_out.tolist()),
         names,
         FORCE,
@@ -163,7 +163,7 @@ def fit_modal_structure(
 def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
     """Return the fit by force balance with the fewest parameters, among those that no richer fit beats significantly
     over the folds."""
-    ordered = sorted(fits, key=lambda fit: (len(fit.numbers), fit.error))
+    ordered = sorted(fits, key=lambda fit: (len(fit.parameters), fit.error))
     best = ordered[0]
     for other in ordered[1:]:
         assert best.joint is not None and other.joint is not None
@@ -226,31 +226,35 @@ def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np
     return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))
 
 
-def _numbers(
+def _parameter_estimates(
     given: BalancedRecordings, fit: JointFit, units_and_parts: tuple[UnitSystem, Sequence[Part]]
-) -> tuple[Number, ...]:
+) -> tuple[ParameterEstimate, ...]:
     names, (system, parts) = given.recording.command.channels, units_and_parts
     return tuple(
-        Number(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
+        ParameterEstimate(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
                float(fit.halves[part][k, k]))
         for part in parts
         for k, name in enumerate(names)
     )  # fmt: skip
 
 
-def _modal_parameters(model: MechanicalModel, recording: Recording) -> tuple[Number, ...]:
+def _modal_parameters(model: MechanicalModel, recording: Recording) -> tuple[ParameterEstimate, ...]:
     along, found = driven_axes(model), []
     own = model.tolerance or Tolerance()
     spread = (own.mass_kg, own.damping_n_s_per_m, own.stiffness_n_per_m)
     for part, matrix, each in zip(PARTS, (model.mass, model.damping, model.stiffness), spread, strict=True):
         values = np.einsum("ni,nk,ki->i", along, matrix, along)
         for name, value in zip(recording.command.channels, values.tolist(), strict=True):
-            found.append(Number(f"{part} {name}", matrix_unit(part, model.system), value, each and 1.96 * each))
+            found.append(
+                ParameterEstimate(f"{part} {name}", matrix_unit(part, model.system), value, each and 1.96 * each)
+            )
     inner = model.coordinates - model.inputs
     if inner > 0:
         squares = np.linalg.eigvals(np.linalg.solve(model.mass, model.stiffness)).real
         swing = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
-        found += [Number(f"mode {k}", "Hz", hz, None) for k, hz in enumerate(sorted(swing.tolist()), start=1)]
+        found += [
+            ParameterEstimate(f"mode {k}", "Hz", hz, None) for k, hz in enumerate(sorted(swing.tolist()), start=1)
+        ]
     return tuple(found)
 
 

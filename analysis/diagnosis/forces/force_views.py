@@ -1,4 +1,12 @@
-"""Converts recordings to forces along the measured motion, with the choice of the band and the noise in it."""
+"""Converts recordings to forces along the measured motion, with the choice of the band and the noise in it.
+
+Theory of operation. With the motion q measured, the force that a model misses follows without simulation (inverse
+dynamics): the model's force M a + D v + K q + (effects along q) is compared with the actuator's force, both low-pass
+filtered up to `band_hz`. Differentiating q twice multiplies its noise by (2 pi f)² M, so the band is the widest in
+which that noise stays below `NOISE_SHARE` of the force, and ends where the force has no power. Noise densities of q are
+converted through the inverse response of the model; an actuator's own uncertainty is added in quadrature. Samples at
+the ends, where the filter has no full support, are not used.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,15 +26,18 @@ from equalizer.signals.band_limited import filter_low_pass, low_pass_gain
 from equalizer.signals.signal import FloatArray, Signal
 
 ACTUATOR_ERROR = 0.01
-"""Relative uncertainty of an actuator's force at best; it counts as noise."""
+"""Relative uncertainty of an actuator's force at best; it counts as noise. By hand."""
 NOISE_SHARE = 0.02
-"""Largest force noise due to the motion's noise, relative to the force's rms; differentiation amplifies it."""
+"""Largest force noise due to the motion's noise, relative to the force's rms; differentiation amplifies it. By hand."""
 WIDEST, NARROWEST = 0.2, 0.002
-"""Band ends that are tried, relative to the sample rate."""
+"""Largest and smallest end of the band, relative to the sample rate. By hand."""
+TRIED_BANDS = 24
+"""Number of ends that are tried between them, in a geometric series."""
 BAND_OVER_MEDIAN = 10.0
-"""Largest end of the band, relative to the frequency below which half of the force's power lies."""
+"""Largest end of the band, relative to the frequency below which half of the force's power lies: far above it there is
+noise alone. By hand."""
 ASSUMED_NOISE = 1e-4
-"""Noise of the motion relative to its rms, assumed where it is not known."""
+"""Noise of the motion relative to its rms, assumed where it is not known. By hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +87,7 @@ def _band(
     rate_hz = records[0].recording.sample_rate_hz
     power = max(float(np.mean((force - force.mean(axis=0)) ** 2)) for force in applied)
     widest = BAND_OVER_MEDIAN * float(np.median([_median_frequency_hz(force, rate_hz) for force in applied])) / rate_hz
-    for band_hz in np.geomspace(min(max(widest, NARROWEST), WIDEST), NARROWEST, 24) * rate_hz:
+    for band_hz in np.geomspace(min(max(widest, NARROWEST), WIDEST), NARROWEST, TRIED_BANDS) * rate_hz:
         noise = min(
             float(np.max(_floor(model, motion, floor, float(band_hz)).response_rms))
             for motion, floor in zip(motions, floors, strict=True)
@@ -93,6 +104,8 @@ def _median_frequency_hz(force: FloatArray, rate_hz: float) -> float:
 
 
 def _view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
+    """The record with the filtered force of its actuators as the response, without the samples at its ends. force:
+    (n, m) in N."""
     recording = record.recording
     rate_hz, command = recording.sample_rate_hz, recording.command
     filtered = filter_low_pass(force, rate_hz, band_hz, late_s=0.5 / rate_hz)
@@ -107,6 +120,7 @@ def _view(record: Observed, force: FloatArray, band_hz: float) -> Observed:
 
 
 def _floor(model: MechanicalModel, motion: MeasuredMotion, floor: NoiseFloor, band_hz: float) -> NoiseFloor:
+    """Noise of the force along the motion, from the motion's noise through the model's inverse response."""
     frequency_hz, m = floor.frequency_hz, model.inputs
     pass_gain = low_pass_gain(frequency_hz, band_hz)[:, None, None]
     gain = np.abs(pass_gain * inverse_response(model, np.maximum(frequency_hz, 1e-3))[:, :m]) ** 2

@@ -1,5 +1,22 @@
 """Nonlinear distortion by kind (odd, even, varying), from repeats and from silent lines of a periodic excitation, by
-channel, input, level and band. `Distortions.remarks` names the kinds that the recording cannot show."""
+channel, input, level and band. `Distortions.remarks` names the kinds that the recording cannot show.
+
+Theory of operation. A linear, time-invariant device responds to a multisine on its driven lines only. Where all of
+these are odd multiples k f0, a term of odd order in the motion (friction, backlash, a cubic spring) makes sums and
+differences of an odd number of odd lines, which are odd; a term of even order makes even lines. So the response's power
+on driven multiples that were left silent, beyond the noise, is the distortion, and its parity tells the kind. Some odd
+lines must be left out of the excitation for that (detection lines). Per kind and band, over the silent lines S,
+
+    D² = 2 L/|S| sum_S (|Y(k)|² - E|N(k)|²)     Y: mean over periods, N: its noise, L: lines that the kind reaches
+
+since the distortion of driven lines, hidden under the response, is taken to be as strong as on their silent neighbours.
+What differs between periods more than the noise ("varying") is no function of a periodic motion: drift, a moving hand,
+friction that depends on its history. Its power is the variance between periods beyond the noise's. p-values: the ratio
+of the power to the noise's is F-distributed (`spectral_lines.excess`).
+
+References: Pintelon and Schoukens, System Identification: A Frequency Domain Approach (2012), chapter 4; Schoukens,
+Vaes and Pintelon, IEEE Control Systems 36 (2016), 38.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,6 +47,8 @@ noise."""
 
 
 class _Where(NamedTuple):
+    """The first five fields of a `Distortion`."""
+
     output: str
     quantity: str
     input: str
@@ -47,6 +66,7 @@ class Distortion:
     input: str
     """Driven inputs, joined by "+"."""
     amplitude: float
+    """Level of the segment's excitation, in the command's unit."""
     band_hz: Band
     whole_band: bool
     """True: the whole driven band; False: one octave of it."""
@@ -73,7 +93,8 @@ class Distortions:
 
 
 def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
-    """Distortion per channel of response and position x input x level x (whole driven band and each octave of it)."""
+    """Distortion per channel of response and position x input x level x (whole driven band and each octave of it).
+    floor: the recording's noise; where it is not known, no cell is evaluated and a remark says so."""
     if not floor.known:
         return Distortions((), ("The noise is not known, so no distortion can be told from it.",))
     found = settled_periods(recording)
@@ -124,15 +145,18 @@ def _cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion]:
 
 
 def _kinds(spectrum: SegmentSpectrum, channel: int, inside: Mask, where: _Where, whole: bool) -> list[Distortion]:
+    """All kinds of distortion in one cell. inside: (lines,), the lines of its band."""
     power, error = np.abs(spectrum.mean[:, channel]) ** 2, spectrum.error[:, channel]
     signal_rms = float(np.sqrt(2 * np.sum(power[inside & spectrum.lines.driven])))
     found: list[tuple[Kind, tuple[float, float, float], float, int]] = []
     for kind, chosen, reached in _detection_masks(spectrum, inside):
+        # Each line's noise has a real and an imaginary part in each of count - 1 differences between periods.
         freedom = float(2 * max(spectrum.count - 1, 1) * chosen.sum())
         beyond = excess(power[chosen], error[chosen], freedom)
         found.append((kind, beyond, reached / chosen.sum(), int(chosen.sum())))
     if spectrum.count > 1:
-        # Each line has count - 1 differences between periods.
+        # Each line has count - 1 independent differences between periods, whose mean square is `spread`; the sum over
+        # them is divided by count - 1 again below.
         spreads = np.repeat(spectrum.spread[inside, channel], spectrum.count - 1)
         beyond = excess(
             spreads,

@@ -74,15 +74,15 @@ class ExperimentSet:
     """Smallest expected log likelihood ratio, over these rivals."""
 
 
-def choose_set(foreseen: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
+def choose_set(predicted: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
     """The recordings to make for rivals of one effect; empty where none would discriminate. A single one where one
     discriminates all that can be, that with the largest gain per cost; else the one first that adds most, per cost, to
-    what is still missing (greedy set cover). foreseen: per rival, the gains of one menu, in its order."""
+    what is still missing (greedy set cover). predicted: per rival, the gains of one menu, in its order."""
     alone, shared = (
-        np.array([[float(getattr(each, name)) for each in of] for of in foreseen]).reshape(len(foreseen), -1)
+        np.array([[float(getattr(each, name)) for each in of] for of in predicted]).reshape(len(predicted), -1)
         for name in ("gain", "shared")
     )
-    menu = [each.experiment for each in foreseen[0]] if len(foreseen) else []
+    menu = [each.experiment for each in predicted[0]] if len(predicted) else []
     cost = np.array([experiment.minutes for experiment in menu])
     most = np.maximum(alone.max(axis=1, initial=0.0), np.sort(shared, axis=1)[:, -MOST_TOGETHER:].sum(axis=1))
     wanted = [int(number) for number in np.argsort(-most, kind="stable") if most[number] >= TELLING_GAIN]
@@ -148,7 +148,7 @@ def _gains(
         there[number] += DIFFERENCE_STEP
         moved = _simulate(bench, there, rival.hypothesis, rival.hypothesis.point, experiment)
         columns.append((moved - base) / DIFFERENCE_STEP)
-    for number, of in enumerate(rival.hypothesis.numbers):
+    for number, of in enumerate(rival.hypothesis.parameters):
         point = rival.hypothesis.point.copy()
         point[number] += of.move
         columns.append((_simulate(bench, rival.deviations, rival.hypothesis, point, experiment) - base) / of.move)

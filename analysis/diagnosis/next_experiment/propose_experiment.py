@@ -61,11 +61,11 @@ def propose_experiment(context: SearchContext, found: Explanation) -> Proposal |
         rate_hz = record.recording.sample_rate_hz
         bench = Bench(context.tuning, rate_hz, record.recording.hold, context.measure.noise)
         menu = experiment_menu(context.tuning.model, rate_hz, axis, level)
-        foreseen = [
+        predicted = [
             predict_gains(bench, named, rival.fitted, _recorded_information(context, rival), menu) for rival in rivals
         ]
         names = (claim.effect.name, *(rival.newest for rival in rivals))
-        proposal = Proposal(names, axis, level, choose_set(foreseen))
+        proposal = Proposal(names, axis, level, choose_set(predicted))
         if proposal.document is not None:
             break
     return proposal

@@ -22,7 +22,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 NOISE, STEPS = "sensor_noise", "force_quantization"
-FORESEEN = 0.02
+LARGEST_CLEAN_ERROR = 0.02
 """Prediction error of a model on a clean recording, as a share, up to which it is used alone to find faults. By hand,
 as the next."""
 NOISY = 0.1
@@ -105,9 +105,9 @@ def contrast_of(
 
 
 def predicts_clean(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
-    """Whether the model as it is predicts every clean recording with an error of at most `FORESEEN`."""
+    """Whether the model as it is predicts every clean recording with an error of at most `LARGEST_CLEAN_ERROR`."""
     errors = [prediction_error(recording, model, "all").as_it_is for recording in clean]
-    return all(error is not None and error <= FORESEEN for error in errors)
+    return all(error is not None and error <= LARGEST_CLEAN_ERROR for error in errors)
 
 
 def noise_is_from_repeats(chosen: MeasureChoice) -> bool:

@@ -24,13 +24,14 @@ if TYPE_CHECKING:
 _NAME, _FREE, _OWN_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
 _NUMBER = re.compile(r"(?<![A-Za-z_\d])\d[\d.]*(?:[eE][+-]?\d+)?")
 MOST = 6
-"""Most candidates that a diagnosis lists."""
+"""Most candidates that a diagnosis lists. By hand."""
 REFINING = {
     "drifting_friction": ("coulomb_friction",),
     "condition_dependent_friction": ("coulomb_friction",),
     "drifting_force": ("constant_force",),
 }
 """Laws that are not simulated, and the special cases that each contains."""
+# Why a candidate is not named, as the document says it: PLAINER, ALIKE and BEYOND.
 PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further parameters are open"
 ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
@@ -87,8 +88,9 @@ def with_balances(
     channels: tuple[str, ...],
     unconfirmed: Sequence[Candidate] = (),
 ) -> Diagnosis:
-    """channels: of the commands; unconfirmed: effects of actuator and sensor that a search found, listed after the laws
-    of the motion. A constant force that no balance names is a parameter of the model, not an effect."""
+    """The diagnosis with classes, shares and candidates of the balances, where no model was given. channels: of the
+    commands; unconfirmed: effects of actuator and sensor that a search found, listed after the laws of the motion. A
+    constant force that no balance names is a parameter of the model, not an effect."""
     if not balances:
         return diagnosis
     weighed = [
@@ -198,7 +200,8 @@ def balance_errors(
 
 
 def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Each effect at its best place. Laws without a name differ by their formulas: those of one answer all stay."""
+    """Each effect at its best place alone; laws without a name differ by their formulas, and all stay. candidates: the
+    best first."""
     first: dict[object, Candidate] = {}
     for candidate in candidates:
         law = candidate.law
@@ -213,7 +216,8 @@ def _explained_share(balance: "Balance", law: "JudgedLaw") -> float:
 
 
 def _with_class(effect: NamedEffect, found: "tuple[JudgedLaw, float] | None") -> NamedEffect:
-    """found: the law as it was weighed, and its share of the mismatch."""
+    """The effect with the class of effects that cannot be distinguished from it, and its share and probability by the
+    balance. found: the law as it was weighed, and its share of the mismatch; None where no balance has it."""
     if found is None:
         late = effect.effect in LATE
         return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *LATE)))) if late else effect
@@ -243,7 +247,7 @@ def refines(effect: str, plain: str) -> bool:
 
 
 def _candidate(weighed: "JudgedLaw", axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
-    """effects: those that are named."""
+    """A law of a balance as a candidate of the document. effects: those that are named."""
     plainer = any(refines(weighed.law.effect, named.effect) and named.axis == axis for named in effects)
     why_not = PLAINER if plainer else "simulations of the whole recording do not bear it out"
     return Candidate(

@@ -25,7 +25,8 @@ from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence
 
-WHERE = "the look at where it sits"
+WHERE = "the localisation"
+"""What crashed, for the note of a crash (`guard`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,11 +37,13 @@ class Examination:
     """Evidence of the re-tuned model."""
     local: Localisation
     signatures: tuple[Signature, ...]
+    """Curve of each named effect: its force over position, velocity or command."""
     black_box: BlackBox | None
 
 
 def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examination:
-    """floor: of the first recording."""
+    """Examine the given, the re-tuned and the final model. floor: noise of the first recording. maps: mismatch maps of
+    the same stages. A piece that crashes is left out and noted (`guard`)."""
     context, found = result.context, result.found
     measure, tuning, stages = context.whole, context.tuning, found.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
@@ -66,10 +69,12 @@ def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examina
 
 
 def _black_box(context: SearchContext, found: Explanation) -> BlackBox | None:
+    """A black box with as many parameters as the effects found, at least 1, fitted to what the re-tuned model leaves;
+    None where waveforms are not compared."""
     if found.statistic is not None:
         return None
-    numbers = max(len(found.after.fitted.hypothesis.point), 1)
-    return black_box(context.whole, found.retuned, numbers, errors_of(context.whole, found).test.after)
+    parameters = max(len(found.after.fitted.hypothesis.point), 1)
+    return black_box(context.whole, found.retuned, parameters, errors_of(context.whole, found).test.after)
 
 
 def _signatures(context: SearchContext, found: Explanation) -> tuple[Signature, ...]:

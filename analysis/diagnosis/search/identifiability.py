@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.hypothesis import Number
+from analysis.diagnosis.errors.hypothesis import FreeParameter
 from analysis.diagnosis.errors.intervals import (
     STRETCH_S,
     finish_fit,
@@ -185,10 +185,12 @@ def _with_profile_errors(context: SearchContext, found: Explanation, time_left: 
     return replace(found, errors=(found.steps[-1].fitted, errors))
 
 
-def _parameters_with_none(found: Explanation, errors: FloatArray) -> Iterator[list[tuple[Number, int, float, float]]]:
+def _parameters_with_none(
+    found: Explanation, errors: FloatArray
+) -> Iterator[list[tuple[FreeParameter, int, float, float]]]:
     """Per effect, its parameters that have a value meaning no effect, with place, coordinate and standard error."""
     hypothesis, first = found.after.fitted.hypothesis, 0
-    each = list(zip(hypothesis.numbers, range(len(errors)), hypothesis.point.tolist(), errors.tolist(), strict=True))
+    each = list(zip(hypothesis.parameters, range(len(errors)), hypothesis.point.tolist(), errors.tolist(), strict=True))
     for claim in hypothesis.claims:
         free = claim.groups * sum(not p.fixed for p in claim.effect.parameters)
         own = [number for number in each[first : first + free] if np.isfinite(number[0].parameter.none or 0.0)]
@@ -202,7 +204,7 @@ def open_effects(context: SearchContext, found: Explanation) -> Iterator[bool]:
         yield bool(own) and all(_is_open(number, at, error) for number, _, at, error in own)
 
 
-def _is_open(number: Number, at: float, error: float) -> bool:
+def _is_open(number: FreeParameter, at: float, error: float) -> bool:
     """Whether the parameter's interval contains the value that means no effect. error: standard error of its coordinate
     `at`."""
     reach, away = _reach(number, at, error)
@@ -210,7 +212,7 @@ def _is_open(number: Number, at: float, error: float) -> bool:
     return away <= _ABSENT * max(abs(value), abs(none)) or not reach <= away
 
 
-def _reach(number: Number, at: float, error: float) -> tuple[float, float]:
+def _reach(number: FreeParameter, at: float, error: float) -> tuple[float, float]:
     """Half width of the parameter's interval, and the distance of its value from no effect."""
     value, none = number.value(at), number.parameter.none or 0.0
     return 1.96 * INTERVAL_FACTOR * abs(number.value(at + error) - value), abs(value - none)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect
-from analysis.evaluation.proof.outcome import DETECTABLE
+from analysis.evaluation.blind_test.outcome import DETECTABLE
 from equalizer.effects.discovered_law import has_memory
 from equalizer.laws.law import Law, law_of
 

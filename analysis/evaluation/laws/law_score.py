@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.evaluation.blind_test.share import Figure, share, statistic
 from analysis.evaluation.laws.law_outcome import LawOutcome
-from analysis.evaluation.proof.share import Figure, share, statistic
 
 
 @dataclass(frozen=True, slots=True)

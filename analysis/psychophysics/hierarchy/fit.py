@@ -19,7 +19,7 @@ class HierarchicalFit:
 
     answers: Answers
     family: Family
-    numbers: FloatArray
+    parameters: FloatArray
     """(k + 6,): see `marginal.Layout`."""
     latent: FloatArray
     """(n, k + 2): each person's thresholds in dB, log-slope, criterion; modes given their answers and the others."""
@@ -30,7 +30,7 @@ class HierarchicalFit:
     """(n, 2): posterior standard deviations of these."""
     log_likelihood: float
     scores: FloatArray
-    """(n, k + 6): gradient of each person's log marginal likelihood at the numbers."""
+    """(n, k + 6): gradient of each person's log marginal likelihood at the parameters."""
     curvature: FloatArray
     """(k + 6, k + 6): Hessian of minus the penalized log marginal likelihood."""
     converged: bool
@@ -41,11 +41,11 @@ class HierarchicalFit:
 
     @property
     def means_db(self) -> FloatArray:
-        return self.numbers[: self.layout.k]
+        return self.parameters[: self.layout.k]
 
     @property
     def lapse(self) -> float:
-        return float(expit(self.numbers[self.layout.lapse]))
+        return float(expit(self.parameters[self.layout.lapse]))
 
 
 def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prior | None = None) -> HierarchicalFit:
@@ -56,8 +56,8 @@ def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prio
     return HierarchicalFit(
         answers=answers,
         family=family,
-        numbers=found.numbers,
-        latent=objective.marginal.centres(found.numbers)[0],
+        parameters=found.parameters,
+        latent=objective.marginal.centres(found.parameters)[0],
         shared_means=found.moments.shared[:, 1:],
         shared_errors=np.sqrt(np.diagonal(found.moments.covariance, axis1=1, axis2=2)[:, 1:]),
         log_likelihood=found.log_likelihood,

@@ -109,20 +109,20 @@ def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prio
     None where no bound is found within `FAR_DB` below the estimate.
     """
     search = Refinement(Objective(fit.answers, fit.family, prior))
-    best = search.lowest_cost(fit.numbers)
+    best = search.lowest_cost(fit.parameters)
     wanted = float(student.ppf(confidence, fit.answers.persons - 1))
-    unit = np.eye(len(fit.numbers))[place]
+    unit = np.eye(len(fit.parameters))[place]
     along = np.linalg.solve(fit.curvature, unit)
     along = along / along[place]
 
     def root(below_db: float) -> float:
         """Signed root of the likelihood ratio: of a quadratic likelihood, a straight line."""
-        # The other numbers begin where a quadratic likelihood would have them; where that ends too low to go on, also
-        # where they are at the estimate, for with few answers the cost has several minima, and a profile is the
+        # The other parameters begin where a quadratic likelihood would have them; where that ends too low to go on,
+        # also where they are at the estimate, for with few answers the cost has several minima, and a profile is the
         # lowest of them.
-        cost = search.lowest_cost(fit.numbers - below_db * along, held=place)
+        cost = search.lowest_cost(fit.parameters - below_db * along, held=place)
         if math.sqrt(max(0.0, 2.0 * (cost - best))) >= wanted:
-            cost = min(cost, search.lowest_cost(fit.numbers - below_db * unit, held=place))
+            cost = min(cost, search.lowest_cost(fit.parameters - below_db * unit, held=place))
         return math.sqrt(max(0.0, 2.0 * (cost - best)))
 
     near, near_root, far = 0.0, 0.0, 2.0
@@ -133,12 +133,12 @@ def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prio
     for _ in range(BOUND_STEPS):
         middle = near + (far - near) * (wanted - near_root) / (far_root - near_root)
         if abs((middle_root := root(middle)) - wanted) < BOUND_ROOT:
-            return float(fit.numbers[place] - middle)
+            return float(fit.parameters[place] - middle)
         if middle_root < wanted:
             near, near_root = middle, middle_root
         else:
             far, far_root = middle, middle_root
-    return float(fit.numbers[place] - far)
+    return float(fit.parameters[place] - far)
 
 
 def direction_limit(

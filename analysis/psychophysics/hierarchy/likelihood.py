@@ -1,8 +1,8 @@
 """The likelihood of a person's answers, its derivatives, and the information that such answers are expected to give.
 
 Per cell: P(right) = lapse + (1 - 2 lapse) Phi(q(t) - side criterion), where half of all lapses are right by chance.
-t = t0 + exp(b) ln(10)/20 (level - theta). A person has the latent numbers z = (theta_1 ... theta_k, b, c): a threshold
-per frequency in dB, the logarithm of the slope, and the criterion in units of d'.
+t = t0 + exp(b) ln(10)/20 (level - theta). A person has the latent parameters z = (theta_1 ... theta_k, b, c): a
+threshold per frequency in dB, the logarithm of the slope, and the criterion in units of d'.
 """
 
 import math

@@ -1,8 +1,8 @@
 """The marginal likelihood of each person by Laplace's method, with its exact gradient.
 
 Population: theta = mean_j + person + person x frequency, both normal; log-slope normal; criterion normal around 0; one
-lapse rate. Its numbers, in this order (`Layout`): the k means in dB, log SD of persons, log SD of person x frequency,
-mean log-slope, log SD of it, log SD of criteria, logit of the lapse rate.
+lapse rate. Its parameters, in this order (`Layout`): the k means in dB, log SD of persons, log SD of person x
+frequency, mean log-slope, log SD of it, log SD of criteria, logit of the lapse rate.
 
 Why adaptive levels change nothing: each level follows from the answers before it by a fixed rule. The probability of a
 whole run is then the product of the probabilities of its answers at the levels played, times factors without any
@@ -67,11 +67,11 @@ class Marginal:
         self.layout = Layout(likelihood.frequencies)
         self._longest = np.array([LONGEST_STEP_DB] * likelihood.frequencies + [LONGEST_STEP_SLOPE, LONGEST_STEP_D])
 
-    def evaluate(self, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Log marginal likelihood of each person (n,), and its gradient (n, size)."""
         layout, k = self.layout, self.layout.k
-        precision, centre = prior_precision(numbers, k), _centre(numbers, k)
-        lapse = float(expit(numbers[layout.lapse]))
+        precision, centre = prior_precision(parameters, k), _centre(parameters, k)
+        lapse = float(expit(parameters[layout.lapse]))
         found = self._find_modes(precision, centre, lapse)
         deviation = self.latent - centre
         inverse = np.linalg.inv(precision + found.information).astype(np.float64)
@@ -88,7 +88,7 @@ class Marginal:
         scores = np.empty((len(value), layout.size))
         by_centre = weighted_deviation - 0.5 * adjoint @ precision
         scores[:, :k], scores[:, layout.slope] = by_centre[:, :k], by_centre[:, k]
-        for place, change, log_det in _precision_derivatives(numbers, k):
+        for place, change, log_det in _precision_derivatives(parameters, k):
             moved = deviation @ change
             scores[:, place] = (
                 -0.5 * np.einsum("na,na->n", deviation, moved)
@@ -101,10 +101,10 @@ class Marginal:
         )
         return value, scores
 
-    def centres(self, numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def centres(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mode of each person (n, k + 2), and the information of the answers there (n, k + 2, k + 2)."""
-        k, lapse = self.layout.k, float(expit(numbers[self.layout.lapse]))
-        found = self._find_modes(prior_precision(numbers, k), _centre(numbers, k), lapse)
+        k, lapse = self.layout.k, float(expit(parameters[self.layout.lapse]))
+        found = self._find_modes(prior_precision(parameters, k), _centre(parameters, k), lapse)
         return self.latent, found.information
 
     def _find_modes(self, precision: FloatArray, centre: FloatArray, lapse: float) -> Derivatives:
@@ -148,31 +148,31 @@ def _positive_curvature(observed: FloatArray, expected: FloatArray) -> FloatArra
     return np.where((lowest > LOWEST_CURVATURE)[:, None, None], observed, expected)
 
 
-def _centre(numbers: FloatArray, k: int) -> FloatArray:
-    return np.concatenate([numbers[:k], [numbers[k + 2], 0.0]])
+def _centre(parameters: FloatArray, k: int) -> FloatArray:
+    return np.concatenate([parameters[:k], [parameters[k + 2], 0.0]])
 
 
-def prior_precision(numbers: FloatArray, k: int) -> FloatArray:
+def prior_precision(parameters: FloatArray, k: int) -> FloatArray:
     """Inverse covariance of the latent parameters, (k + 2, k + 2): a person has a deviation shared by all frequencies,
     and another at each frequency."""
-    shared, own = math.exp(2.0 * numbers[k]), math.exp(2.0 * numbers[k + 1])
+    shared, own = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
     out = np.zeros((k + 2, k + 2))
     mean = np.full((k, k), 1.0 / k)
     out[:k, :k] = (np.eye(k) - mean) / own + mean / (own + k * shared)
-    out[k, k], out[k + 1, k + 1] = math.exp(-2.0 * numbers[k + 3]), math.exp(-2.0 * numbers[k + 4])
+    out[k, k], out[k + 1, k + 1] = math.exp(-2.0 * parameters[k + 3]), math.exp(-2.0 * parameters[k + 4])
     return out
 
 
-def _precision_derivatives(numbers: FloatArray, k: int) -> list[tuple[int, FloatArray, float]]:
+def _precision_derivatives(parameters: FloatArray, k: int) -> list[tuple[int, FloatArray, float]]:
     """Per log SD: its place, the change of the precision, and of the precision's log determinant."""
-    shared, own = math.exp(2.0 * numbers[k]), math.exp(2.0 * numbers[k + 1])
+    shared, own = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
     together = own + k * shared
     mean = np.full((k, k), 1.0 / k)
     by_shared, by_own, by_slope, by_criterion = (np.zeros((k + 2, k + 2)) for _ in range(4))
     by_shared[:k, :k] = -2.0 * k * shared / together**2 * mean
     by_own[:k, :k] = -2.0 / own * (np.eye(k) - mean) - 2.0 * own / together**2 * mean
-    by_slope[k, k] = -2.0 * math.exp(-2.0 * numbers[k + 3])
-    by_criterion[k + 1, k + 1] = -2.0 * math.exp(-2.0 * numbers[k + 4])
+    by_slope[k, k] = -2.0 * math.exp(-2.0 * parameters[k + 3])
+    by_criterion[k + 1, k + 1] = -2.0 * math.exp(-2.0 * parameters[k + 4])
     return [
         (k, by_shared, -2.0 * k * shared / together),
         (k + 1, by_own, -2.0 * (k - 1) - 2.0 * own / together),

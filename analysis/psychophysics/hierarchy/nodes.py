@@ -1,4 +1,4 @@
-"""Nodes of the adaptive quadrature: where each person's latent numbers probably lie, by Laplace's method.
+"""Nodes of the adaptive quadrature: where each person's latent parameters probably lie, by Laplace's method.
 
 Given what a person shares over frequencies (deviation u, log-slope b, criterion c) the thresholds at single frequencies
 are independent. So there are outer nodes over u, b and c, and at each of them inner nodes for the threshold of every
@@ -43,7 +43,7 @@ weight falls on one node."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moments:
-    """Posterior distribution of each person's latent numbers, as far as nodes need it; n persons, k frequencies."""
+    """Posterior distribution of each person's latent parameters, as far as nodes need it; n persons, k frequencies."""
 
     shared: FloatArray
     """(n, 3): means of u, b and c."""
@@ -84,23 +84,23 @@ class Population:
     lapse: float
 
     @staticmethod
-    def of(numbers: FloatArray, k: int) -> "Population":
-        shared, own, slope_sd, criterion_sd = (math.exp(numbers[k + place]) for place in (0, 1, 3, 4))
-        lapse = float(expit(numbers[k + 5]))
-        return Population(numbers[:k], shared, own, float(numbers[k + 2]), slope_sd, criterion_sd, lapse)
+    def of(parameters: FloatArray, k: int) -> "Population":
+        shared, own, slope_sd, criterion_sd = (math.exp(parameters[k + place]) for place in (0, 1, 3, 4))
+        lapse = float(expit(parameters[k + 5]))
+        return Population(parameters[:k], shared, own, float(parameters[k + 2]), slope_sd, criterion_sd, lapse)
 
 
-def laplace_moments(numbers: FloatArray, mode: FloatArray, information: FloatArray) -> Moments:
+def laplace_moments(parameters: FloatArray, mode: FloatArray, information: FloatArray) -> Moments:
     """By Laplace's method. mode: (n, k + 2), information of the answers there: (n, k + 2, k + 2)."""
     k = mode.shape[1] - 2
-    population, places = Population.of(numbers, k), np.arange(k)
+    population, places = Population.of(parameters, k), np.arange(k)
     own, shared = population.own_sd**2, population.shared_sd**2
     # u given all thresholds is normal: its mean is `drawn` times the sum of their deviations.
     rest = 1.0 / (1.0 / shared + k / own)
     drawn = rest / own
     weights = np.zeros((3, k + 2))
     weights[0, :k], weights[1, k], weights[2, k + 1] = drawn, 1.0, 1.0
-    covariance = weights @ np.linalg.inv(prior_precision(numbers, k) + information) @ weights.T
+    covariance = weights @ np.linalg.inv(prior_precision(parameters, k) + information) @ weights.T
     covariance[:, 0, 0] += rest
     middle = mode @ weights.T
     middle[:, 0] -= drawn * population.means.sum()

@@ -42,34 +42,34 @@ class Objective:
     def __init__(self, answers: Answers, family: Family, prior: Prior) -> None:
         self.answers, self.family = answers, family
         self.prior, self.layout = prior, Layout(len(answers.frequencies_hz))
-        begin = starting_numbers(answers, family)
+        begin = starting_parameters(answers, family)
         k = self.layout.k
         latent = np.tile(np.concatenate([begin[:k], [begin[self.layout.slope], 0.0]]), (answers.persons, 1))
         self.marginal = Marginal(TrialLikelihood(answers, family), latent)
         self.begin = begin
         self._middle_db = float(np.average(answers.level_db, weights=answers.right + answers.wrong))
 
-    def __call__(self, numbers: FloatArray) -> tuple[float, FloatArray]:
-        value, scores = self.marginal.evaluate(numbers)
-        penalty, slope = self.penalty(numbers)
+    def __call__(self, parameters: FloatArray) -> tuple[float, FloatArray]:
+        value, scores = self.marginal.evaluate(parameters)
+        penalty, slope = self.penalty(parameters)
         return -float(value.sum()) - penalty, -scores.sum(axis=0) - slope
 
-    def penalty(self, numbers: FloatArray) -> tuple[float, FloatArray]:
+    def penalty(self, parameters: FloatArray) -> tuple[float, FloatArray]:
         """Log density of the prior, and its gradient."""
         layout, prior = self.layout, self.prior
-        lapse = float(expit(numbers[layout.lapse]))
+        lapse = float(expit(parameters[layout.lapse]))
         slope = np.zeros(layout.size)
         slope[layout.log_sds] = prior.spread
-        away = numbers[: layout.k] - self._middle_db
+        away = parameters[: layout.k] - self._middle_db
         slope[: layout.k] = -away / prior.mean_sd_db**2
         slope[layout.lapse] = prior.lapse_wrong * (1.0 - lapse) - prior.lapse_right * lapse
         value = prior.lapse_wrong * np.log(lapse) + prior.lapse_right * np.log1p(-lapse)
         value -= 0.5 * float(away @ away) / prior.mean_sd_db**2
-        return float(value + prior.spread * numbers[layout.log_sds].sum()), slope
+        return float(value + prior.spread * parameters[layout.log_sds].sum()), slope
 
-    def penalty_hessian(self, numbers: FloatArray) -> FloatArray:
+    def penalty_hessian(self, parameters: FloatArray) -> FloatArray:
         layout, prior = self.layout, self.prior
-        lapse = float(expit(numbers[layout.lapse]))
+        lapse = float(expit(parameters[layout.lapse]))
         bent = np.zeros(layout.size)
         bent[: layout.k] = -1.0 / prior.mean_sd_db**2
         bent[layout.lapse] = -(prior.lapse_wrong + prior.lapse_right) * lapse * (1.0 - lapse)
@@ -84,7 +84,7 @@ class Objective:
         return bounds
 
 
-def starting_numbers(answers: Answers, family: Family) -> FloatArray:
+def starting_parameters(answers: Answers, family: Family) -> FloatArray:
     """Starting values of the population parameters: means from the levels played, usual spreads."""
     k = len(answers.frequencies_hz)
     trials = answers.right + answers.wrong

@@ -88,7 +88,7 @@ def primary_analysis(
         return None
     fit = fit_hierarchy(answers, family)
     pseudo, cap_db, frequencies = pseudo_thresholds(fit), to_db(cap_n), answers.frequencies_hz
-    numbers, k, sds = fit.numbers, fit.layout.k, np.exp(fit.numbers[fit.layout.log_sds])
+    parameters, k, sds = fit.parameters, fit.layout.k, np.exp(fit.parameters[fit.layout.log_sds])
     persons = estimate_persons(answers.subjects, np.hstack([fit.latent[:, :-2], fit.shared_means]), cap_db)
     return PrimaryAnalysis(
         family=family,
@@ -102,7 +102,7 @@ def primary_analysis(
         persons=persons,
         runs=run_likelihoods(answers, _nuisances(fit, persons), cap_db, family, confidence),
         person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),
-        slope=float(np.exp(numbers[k + 2])),
+        slope=float(np.exp(parameters[k + 2])),
         slope_log_sd=float(sds[2]),
         criterion_sd=float(sds[3]),
         lapse=fit.lapse,

@@ -86,10 +86,10 @@ class Quadrature:
         return value, slope * first, slope**2 * second + slope * (1.0 - 2.0 * lapse) * first
 
 
-def integrate(quadrature: Quadrature, numbers: FloatArray, moments: Moments, counts: Counts) -> Integrals:
-    """moments: at these numbers, or near them."""
+def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, counts: Counts) -> Integrals:
+    """moments: at these parameters, or near them."""
     k = quadrature.k
-    population = Population.of(numbers, k)
+    population = Population.of(parameters, k)
     nodes = place_nodes(moments, counts)
     likelihood, by_lapse, by_lapse_twice = quadrature.log_likelihoods(nodes, population.lapse)
     u, b, c = np.moveaxis(nodes.shared, 2, 0)

@@ -10,6 +10,7 @@ from analysis.psychophysics.hierarchy.quadrature import Quadrature, integrate
 from equalizer.signals.signal import FloatArray
 
 NEWTON_STEPS = 10
+"""Most Newton steps of one climb to a maximum. By hand."""
 SETTLED = {COARSE: 0.1, FINE: 1e-3, FIXED: 1e-3}
 """Twice the gain in log-likelihood that the next step would bring: 0.001 is a thirtieth of a standard error, and the
 step before it was that of a quadratic function already."""
@@ -27,7 +28,7 @@ SHORTER = 3
 class Refined:
     """The maximum by quadrature, with gradients and Hessian there."""
 
-    numbers: FloatArray
+    parameters: FloatArray
     cost: float
     """Minus the penalized log marginal likelihood."""
     log_likelihood: float
@@ -51,27 +52,28 @@ class Refinement:
         self._longest = np.full(len(bounds), LONGEST_STEP[1])
         self._longest[: objective.layout.k] = LONGEST_STEP[0]
 
-    def maximum(self, numbers: FloatArray) -> Refined:
-        """numbers: where the search by Laplace's method ended."""
-        coarse = self._climb(self._begin(numbers, COARSE), COARSE)
-        fine = self._climb(self._evaluate(coarse.numbers, coarse.moments, FINE), FINE)
+    def maximum(self, parameters: FloatArray) -> Refined:
+        """parameters: where the search by Laplace's method ended."""
+        coarse = self._climb(self._begin(parameters, COARSE), COARSE)
+        fine = self._climb(self._evaluate(coarse.parameters, coarse.moments, FINE), FINE)
         if fine.converged:
             return fine
-        return self._climb(self._evaluate(fine.numbers, fine.moments, FIXED), FIXED)
+        return self._climb(self._evaluate(fine.parameters, fine.moments, FIXED), FIXED)
 
-    def lowest_cost(self, numbers: FloatArray, held: int | None = None) -> float:
-        """Cost at the maximum near these numbers, by coarse nodes. held: a parameter that keeps its value (profile)."""
-        found = self._climb(self._begin(numbers, COARSE), COARSE, held)
+    def lowest_cost(self, parameters: FloatArray, held: int | None = None) -> float:
+        """Cost at the maximum near these parameters, by coarse nodes. held: index of a parameter that keeps its value
+        (profile)."""
+        found = self._climb(self._begin(parameters, COARSE), COARSE, held)
         if not found.converged:
-            laplace = maximise(self.objective, numbers, held).x
+            laplace = maximise(self.objective, parameters, held).x
             found = self._climb(self._begin(laplace, COARSE), COARSE, held)
         # What is still missing is known from the curvature.
         return found.cost + 0.5 * float(found.slope @ self._newton_step(found, held))
 
-    def _begin(self, numbers: FloatArray, counts: Counts) -> Refined:
-        numbers = np.clip(numbers, self._lower, self._upper)
-        moments = laplace_moments(numbers, *self.objective.marginal.centres(numbers))
-        return self._evaluate(numbers, moments, counts)
+    def _begin(self, parameters: FloatArray, counts: Counts) -> Refined:
+        parameters = np.clip(parameters, self._lower, self._upper)
+        moments = laplace_moments(parameters, *self.objective.marginal.centres(parameters))
+        return self._evaluate(parameters, moments, counts)
 
     def _climb(self, at: Refined, counts: Counts, held: int | None = None) -> Refined:
         for _ in range(NEWTON_STEPS):
@@ -80,36 +82,38 @@ class Refinement:
                 return at
             share = 1.0 / max(1.0, float(np.abs(step / self._longest).max()))
             for _ in range(SHORTER):
-                then = self._evaluate(np.clip(at.numbers + share * step, self._lower, self._upper), at.moments, counts)
+                then = self._evaluate(
+                    np.clip(at.parameters + share * step, self._lower, self._upper), at.moments, counts
+                )
                 if then.cost <= at.cost + SAME_HEIGHT:
                     break
                 share /= 4.0
             else:
                 # The nodes were not yet where the person is: again, with those that this evaluation has found.
-                then = self._evaluate(at.numbers, at.moments, counts)
+                then = self._evaluate(at.parameters, at.moments, counts)
             at = replace(then, moments=at.moments) if counts is FIXED else then
         return replace(at, converged=False)
 
     def _newton_step(self, at: Refined, held: int | None) -> FloatArray:
         """0 for what is held, and for what is at a bound that it would cross."""
-        pushed = ((at.numbers <= self._lower) & (at.slope > 0)) | ((at.numbers >= self._upper) & (at.slope < 0))
-        free = (np.arange(len(at.numbers)) != held) & ~pushed
+        pushed = ((at.parameters <= self._lower) & (at.slope > 0)) | ((at.parameters >= self._upper) & (at.slope < 0))
+        free = (np.arange(len(at.parameters)) != held) & ~pushed
         values, vectors = np.linalg.eigh(at.curvature[np.ix_(free, free)])
-        step = np.zeros(len(at.numbers))
+        step = np.zeros(len(at.parameters))
         # Uphill where the curvature says so, and as far as its size says where it is of the wrong sign.
         step[free] = -vectors @ ((vectors.T @ at.slope[free]) / np.maximum(np.abs(values), LEAST_CURVATURE))
         return step
 
-    def _evaluate(self, numbers: FloatArray, moments: Moments, counts: Counts) -> Refined:
-        found = integrate(self._quadrature, numbers, moments, counts)
-        penalty, slope = self.objective.penalty(numbers)
+    def _evaluate(self, parameters: FloatArray, moments: Moments, counts: Counts) -> Refined:
+        found = integrate(self._quadrature, parameters, moments, counts)
+        penalty, slope = self.objective.penalty(parameters)
         value = float(found.value.sum())
         return Refined(
-            numbers=numbers,
+            parameters=parameters,
             cost=-value - penalty,
             log_likelihood=value,
             scores=found.scores,
-            curvature=-found.hessian - self.objective.penalty_hessian(numbers),
+            curvature=-found.hessian - self.objective.penalty_hessian(parameters),
             slope=-found.scores.sum(axis=0) - slope,
             moments=found.moments,
             converged=True,

@@ -37,7 +37,9 @@ class Nuisance:
     """What a run itself does not tell."""
 
     slope: float
+    """Median slope, in the units of `curve`."""
     criterion: float
+    """Mean criterion, in units of d'."""
     lapses: tuple[float, ...]
     """Equally probable lapse rates."""
     slope_log_sd: float = 0.0
@@ -73,7 +75,8 @@ def run_likelihoods(
     family: Family = Family.WEIBULL,
     confidence: float = 0.95,
 ) -> tuple[RunLikelihood, ...]:
-    """people: in the order of the answers."""
+    """Threshold and interval of each person at each frequency, in the order of the runs' numbers. people: what their
+    runs do not tell, in the order of the answers' subjects. cap_db: in dB re 1 N."""
     k = len(answers.frequencies_hz)
     found = []
     for run in np.unique(answers.run):

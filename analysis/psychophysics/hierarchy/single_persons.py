@@ -47,17 +47,17 @@ def fit_single_persons(
     """Most probable thresholds, slopes and criteria, at the most probable lapse rate."""
     answers, cap_db = at_played_frequencies(answers), to_db(cap_n)
     objective = Objective(answers, family, prior := Prior())
-    numbers, layout = objective.begin.copy(), objective.layout
-    numbers[: layout.k] = np.average(answers.level_db, weights=answers.right + answers.wrong)
-    numbers[layout.log_sds] = [0.0, math.log(FREE_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
+    parameters, layout = objective.begin.copy(), objective.layout
+    parameters[: layout.k] = np.average(answers.level_db, weights=answers.right + answers.wrong)
+    parameters[layout.log_sds] = [0.0, math.log(FREE_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
 
     def cost(logit_lapse: float) -> float:
-        numbers[layout.lapse] = logit_lapse
-        return objective(numbers)[0]
+        parameters[layout.lapse] = logit_lapse
+        return objective(parameters)[0]
 
-    numbers[layout.lapse] = minimize_scalar(cost, bounds=LAPSE_BOUNDS, method="bounded", options={"xatol": 1e-3}).x
-    objective(numbers)
-    lapse = float(expit(numbers[layout.lapse]))
+    parameters[layout.lapse] = minimize_scalar(cost, bounds=LAPSE_BOUNDS, method="bounded", options={"xatol": 1e-3}).x
+    objective(parameters)
+    lapse = float(expit(parameters[layout.lapse]))
     persons = estimate_persons(answers.subjects, objective.marginal.latent, cap_db)
     lapses = tuple(float(lapse) for lapse in beta.ppf(LAPSE_QUANTILES, prior.lapse_wrong, prior.lapse_right))
     unknown = Nuisance(USUAL_SLOPE[family], 0.0, lapses, SLOPE_LOG_SD, CRITERION_SD)

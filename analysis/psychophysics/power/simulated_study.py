@@ -27,8 +27,10 @@ from protocols.definition.staircase_rule import StaircaseRule
 from protocols.procedure.staircase import to_db
 
 _HABITS = 0x4AB1
-"""Separates the draws of habits from the others, which stay those of studies without any."""
+"""Last word of the seed from which habits (guessing, drift, order of runs) are drawn, so that all other draws stay
+those of a study without habits."""
 FAMILIES = (Family.WEIBULL, Family.LOGISTIC, Family.GAUSS)
+"""Families of curves in the order of the kernel's numbers (`staircase_kernel.evidence`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +48,11 @@ class Crowd:
     slope: float | None = None
     """Median; None: as steep as a Weibull slope of 2 over newtons."""
     slope_log_sd: float = 0.25
+    """Standard deviation between people of the slope's natural logarithm."""
     lapse: float = 0.02
+    """Share of wrong answers at the strongest level."""
     criterion_sd: float = 0.15
+    """Standard deviation between people of the criterion, in units of d'."""
     family: Family = Family.WEIBULL
     guessers: float = 0.0
     """Share of people who guess."""
@@ -78,8 +83,9 @@ class SimulatedStudy:
     cap_reversals: FloatArray
     """(people, frequencies): averaged reversals that are peaks at the cap; of Psi, 1 where a threshold is cut."""
     trials: int
+    """Of all runs together."""
     true_db: FloatArray
-    """(people, frequencies)."""
+    """(people, frequencies): true thresholds in dB re 1 N."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,7 +98,8 @@ class _RunThresholds:
 
 
 def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...]) -> SimulatedStudy:
-    """The same seed gives the same study, on any machine and in any order of work."""
+    """Draw people from the crowd and play all their runs by this rule. The same seed gives the same study, on any
+    machine and in any order of work."""
     rng, k = np.random.default_rng(seed), len(crowd.frequencies_hz)
     true_db, participants = _draw_people(crowd, people, rng)
     seeds = rng.integers(0, 2**32, size=(people, k), dtype=np.uint64)
@@ -136,6 +143,7 @@ def _draw_people(crowd: Crowd, people: int, rng: np.random.Generator) -> tuple[F
 
 
 def _reversal_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFound]) -> _RunThresholds:
+    """Means of the averaged reversals of each run; NaN where a run did not reach all its reversals."""
     averaged = tracks.reversal_db[:, -rule.averaged_reversals :]
     whole = np.where(np.array([run.reversals for run in found]) == rule.reversals, 1.0, math.nan)
     newtons = np.minimum(10.0 ** (averaged / 20.0), rule.cap_n)
@@ -152,7 +160,9 @@ def _posterior_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFoun
     return _RunThresholds(np.minimum(10.0 ** (db / 20.0), rule.cap_n), db, cut.astype(np.float64))
 
 
-def _feeling(participant: Participant, delivery: FeltDelivery | None, place: int) -> Participant:
+def _feel_delivery(participant: Participant, delivery: FeltDelivery | None, place: int) -> Participant:
+    """The participant, who feels what the device delivers at the frequency of index `place`; without a delivery, the
+    command itself."""
     if delivery is None:
         return participant
     first, second = (np.array(table) * (1.0, 1.0, 1.0, delivery.masking) for table in delivery.tables[place])
@@ -187,7 +197,7 @@ def _play_sessions(
         before = 0
         for place in habits.permutation(k):
             run = first + int(place)
-            participant = _feeling(participants[run], crowd.delivery, int(place))._replace(
+            participant = _feel_delivery(participants[run], crowd.delivery, int(place))._replace(
                 criterion_per_trial=drift, trials_before=before, unsure=crowd.unsure, repeats=crowd.repeats
             )
             if guesses:

@@ -52,7 +52,7 @@ def force_along(
     force = np.array(pushing, dtype=np.float64, order="C")
     position, velocity, acceleration = (np.ascontiguousarray(each) for each in motion)
     run_laws_along(
-        acting.laws, acting.places, acting.numbers, acting.memory, (position, velocity, acceleration),
+        acting.laws, acting.places, acting.parameters, acting.memory, (position, velocity, acceleration),
         np.ascontiguousarray(commands, dtype=np.float64) if acting.sees else np.empty((0, 0)),
         per_newton, force, 1 / sample_rate_hz,
     )  # fmt: skip

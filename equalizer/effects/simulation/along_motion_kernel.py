@@ -60,7 +60,7 @@ def _write_seen_axes(
     cache=True, nogil=True, error_model="numpy",
 )  # fmt: skip
 def run_laws_along(  # noqa: PLR0913 - a kernel takes flat arrays
-    laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray,
+    laws: Any, places: Integers, parameters: FloatArray, memory: FloatArray,
     motion: Motion, commands: FloatArray, per_newton: FloatArray,
     force: FloatArray, step_s: float,
 ) -> None:  # fmt: skip
@@ -93,7 +93,7 @@ def run_laws_along(  # noqa: PLR0913 - a kernel takes flat arrays
                 at[LENGTH + SEEN * axis + SEEN_V_END] = at[V_FREE]
                 at[LENGTH + SEEN * axis + SEEN_A] = at[A_FREE]
             kept = memory[places[item, 4] : places[item, 5]]
-            added = laws[places[item, 0]](numbers[places[item, 2] : places[item, 3]], kept, at)
+            added = laws[places[item, 0]](parameters[places[item, 2] : places[item, 3]], kept, at)
             force[k, axis] += added
             pushing[axis] += added
     force[len(position) - 1] = force[len(position) - 2]

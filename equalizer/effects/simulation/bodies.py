@@ -29,7 +29,7 @@ class Bodies:
     """One per force: its law."""
     port: tuple[int, ...]
     """One per force: index of the port at which it acts."""
-    numbers: tuple[FloatArray, ...]
+    parameters: tuple[FloatArray, ...]
     """Parameters of each force's law."""
 
     @property
@@ -51,13 +51,13 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
     ports = list(driven_axes(structure).T)
     acts: list[AxisForce | JointForce] = []
     where: list[int] = []
-    numbers: list[FloatArray] = []
+    parameters: list[FloatArray] = []
     # Joints come first, so that friction found after them acts on the structure with joints.
     for placed in sorted(effects, key=lambda effect: isinstance(effect.effect.acts, AxisForce)):
         act = placed.effect.acts
         for site in placed.sites if isinstance(act, (AxisForce, JointForce)) else ():
             assert isinstance(act, (AxisForce, JointForce))
-            numbers.append(np.asarray(act.pack(structure, site, placed.values), dtype=np.float64))
+            parameters.append(np.asarray(act.pack(structure, site, placed.values), dtype=np.float64))
             acts.append(act)
             if isinstance(act, JointForce):
                 structure, along = act.change(structure, site, placed.values)
@@ -66,7 +66,7 @@ def bodies_of(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies
     aligned = np.zeros((structure.coordinates, len(ports)))
     for number, port in enumerate(ports):
         aligned[: len(port), number] = port
-    return Bodies(structure, model.inputs, aligned, tuple(acts), tuple(where), tuple(numbers))
+    return Bodies(structure, model.inputs, aligned, tuple(acts), tuple(where), tuple(parameters))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,18 +181,18 @@ def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
     laws: list[object] = []
     places: list[tuple[int, ...]] = []
     used = kept = 0
-    for act, port, numbers in zip(bodies.acts, bodies.port, bodies.numbers, strict=True):
+    for act, port, parameters in zip(bodies.acts, bodies.port, bodies.parameters, strict=True):
         if act.law not in laws:
             laws.append(act.law)
-        places.append((laws.index(act.law), ports.index(port), used, used + len(numbers), kept, kept + act.memory))
-        used, kept = used + len(numbers), kept + act.memory
+        places.append((laws.index(act.law), ports.index(port), used, used + len(parameters), kept, kept + act.memory))
+        used, kept = used + len(parameters), kept + act.memory
     if len(laws) > LAWS:
         raise ValueError(f"{len(laws)} different force laws act at once; simulate at most {LAWS}")
     return Forces(
         ports,
         tuple(law_address(law) for law in (*laws, *(no_force,) * (LAWS - len(laws)))),
         np.array(places, dtype=np.int64).reshape(-1, 6),
-        np.concatenate([*bodies.numbers, [0.0]]),
+        np.concatenate([*bodies.parameters, [0.0]]),
         np.zeros(kept + 1),
         any(act.acceleration for act in bodies.acts),
         bodies.sees,

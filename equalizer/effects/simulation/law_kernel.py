@@ -29,8 +29,8 @@ from equalizer.laws.program import DEEPEST
 from equalizer.signals.signal import FloatArray
 
 AXES, ACCELERATION, CONDITIONS, SAMPLES, RATE_HZ, TABLE = range(6)
-"""Indices in `numbers`: number of driven axes; whether the law reads an acceleration; number of recorded conditions, of
-their samples, and their rate; start of the conditions, sample by sample. The program follows them."""
+"""Indices in `parameters`: number of driven axes; whether the law reads an acceleration; number of recorded
+conditions, of their samples, and their rate; start of the conditions, sample by sample. The program follows them."""
 PER_AXIS = 4
 """Signals: the time, then each axis' position, velocity, acceleration and command, then the conditions."""
 CLOSE = 1e-7
@@ -41,11 +41,11 @@ TRIES = 60
 
 @njit(inline="always")
 def _law_value(
-    numbers: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force: float, ahead: float
+    parameters: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force: float, ahead: float
 ) -> float:
     """The law's force at the step's start or end, if the given force acted over the step. Accelerations are means over
     the step; ahead: 1 for those at its end."""
-    axes, conditions, step_s = int(numbers[AXES]), int(numbers[CONDITIONS]), at[STEP_S]
+    axes, conditions, step_s = int(parameters[AXES]), int(parameters[CONDITIONS]), at[STEP_S]
     count = 1 + PER_AXIS * axes + conditions
     signals = memory[DEEPEST : DEEPEST + count]
     time_s = at[TIME_S] + (step_s if phase == END else 0.0)
@@ -60,13 +60,13 @@ def _law_value(
         if ahead != 0.0:
             signals[to + 2] += signals[to + 2] - at[begin + SEEN_A] - at[begin + SEEN_A_PER_N] * force
         signals[to + 3] = at[begin + SEEN_COMMAND]
-    samples = int(numbers[SAMPLES])
+    samples = int(parameters[SAMPLES])
     if conditions > 0:
         # Sampled at the middle of the step, which lies in the right sample even when the ends are rounded.
-        now = max(min(int((at[TIME_S] + 0.5 * step_s) * numbers[RATE_HZ]), samples - 1), 0)
+        now = max(min(int((at[TIME_S] + 0.5 * step_s) * parameters[RATE_HZ]), samples - 1), 0)
         for k in range(conditions):
-            signals[count - conditions + k] = numbers[TABLE + now * conditions + k]
-    program = numbers[TABLE + samples * conditions :]
+            signals[count - conditions + k] = parameters[TABLE + now * conditions + k]
+    program = parameters[TABLE + samples * conditions :]
     return float(run(program, signals, memory[DEEPEST + count :], memory[:DEEPEST], phase, time_s, step_s))
 
 
@@ -80,14 +80,14 @@ def _end_share(start: float, first: float, second: float) -> float:
 
 
 @compile_law
-def law_force(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    heavy = numbers[ACCELERATION] != 0.0
-    start = low = _law_value(numbers, memory, at, START, 0.0, 0.0)
-    conditions = int(numbers[CONDITIONS])
-    kept = memory[DEEPEST + 1 + PER_AXIS * int(numbers[AXES]) + conditions :]
+def law_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    heavy = parameters[ACCELERATION] != 0.0
+    start = low = _law_value(parameters, memory, at, START, 0.0, 0.0)
+    conditions = int(parameters[CONDITIONS])
+    kept = memory[DEEPEST + 1 + PER_AXIS * int(parameters[AXES]) + conditions :]
     kept[0] = BEGUN
-    end = first = high = _law_value(numbers, memory, at, END, low, 0.0)
-    second = _law_value(numbers, memory, at, END, high, 0.0)
+    end = first = high = _law_value(parameters, memory, at, END, low, 0.0)
+    second = _law_value(parameters, memory, at, END, high, 0.0)
     late = 1.0 if heavy else _end_share(start, first, second)
     low_off, high_off = low - (1 - late) * start - late * first, high - (1 - late) * start - late * second
     near, force = CLOSE * (abs(start) + abs(first) + abs(second)), high
@@ -98,7 +98,7 @@ def law_force(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
             force = 0.5 * (low + high)
         else:
             force = high - high_off * (high - low) / across if across != 0.0 else high
-        end = _law_value(numbers, memory, at, END, force, 0.0)
+        end = _law_value(parameters, memory, at, END, force, 0.0)
         off = force - (1 - late) * start - late * end
         if not abs(off) > near or abs(high - low) <= 1e-2 * near:
             break
@@ -109,6 +109,6 @@ def law_force(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
                 low, low_off = high, high_off
             high, high_off = force, off
     # In sticking, the force is between those of the two sliding directions.
-    at[F_END] = _law_value(numbers, memory, at, END, force, 1.0) if heavy else (force - (1 - late) * start) / late
-    commit_step(numbers[TABLE + int(numbers[SAMPLES]) * conditions :], kept, at[TIME_S] + at[STEP_S])
+    at[F_END] = _law_value(parameters, memory, at, END, force, 1.0) if heavy else (force - (1 - late) * start) / late
+    commit_step(parameters[TABLE + int(parameters[SAMPLES]) * conditions :], kept, at[TIME_S] + at[STEP_S])
     return float(force)

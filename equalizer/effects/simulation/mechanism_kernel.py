@@ -172,13 +172,13 @@ def _write_seen_ports(per_newton: FloatArray, port: int, ports: FloatArray, at: 
 
 
 @compile_law
-def no_force(numbers: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def no_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return 0.0
 
 
 @njit(inline="always")
 def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
-    law: Any, numbers: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
+    law: Any, parameters: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
     at: FloatArray,
 ) -> tuple[float, float]:  # fmt: skip
     """Solve for one force, over the step and at its end, with all others held."""
@@ -190,7 +190,7 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
     at[F_END] = np.nan
     if at.shape[0] > LENGTH:
         _write_seen_ports(per_newton, port, ports, at)
-    mean = law(numbers, memory, at)
+    mean = law(parameters, memory, at)
     end = mean if np.isnan(at[F_END]) else at[F_END]
     _add_force(per_newton, port, mean, end, ports)
     return mean, end
@@ -201,7 +201,7 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
     cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED,
 )  # fmt: skip
 def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
-    laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
+    laws: Any, places: Integers, parameters: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
     own: FloatArray, at: FloatArray, before: FloatArray,
 ) -> None:  # fmt: skip
     """Solve for several forces in turn (Gauss-Seidel), from their means over the last two steps extrapolated. own:
@@ -224,7 +224,7 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
                     memory[i] = before[i]
             begin, law = places[item, 2], laws[places[item, 0]]
             own[_MEAN, item], own[_ENDS, item] = _solve_force(
-                law, numbers[begin : places[item, 3]], memory[kept:end], port, per_newton, ports, at
+                law, parameters[begin : places[item, 3]], memory[kept:end], port, per_newton, ports, at
             )
             if not abs(own[_MEAN, item] - mean) <= SETTLED * abs(mean):
                 for other in range(places.shape[0]):
@@ -240,7 +240,7 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
     cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED,
 )  # fmt: skip
 def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
-    laws: Any, places: Integers, numbers: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
+    laws: Any, places: Integers, parameters: FloatArray, memory: FloatArray, step: Four, rows: FloatArray,
     commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
     added: FloatArray, at: FloatArray, own: FloatArray, before: FloatArray,
 ) -> None:  # fmt: skip
@@ -250,10 +250,10 @@ def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     at its start; a sample's first row becomes the state before it and the forces (r,) at that instant. commands: (n
     stride, m), or (0, 0) where no law reads them. ports: (PORT_ROWS, r) and state: (s,) become those of the end.
 
-    places: (items, 6) law, port, begin and end in `numbers`, begin and end in `memory`. step: matrix that advances the
-    state; output matrix of the ports' positions and velocities (2 r, s), with accelerations (3 r, s) where a law reads
-    them; effect of the forces on the state (r, s); and `per_newton`. count: steps per sample; stride (1 where commands
-    are held over all steps, else the number of steps); number of the first sample.
+    places: (items, 6) law, port, begin and end in `parameters`, begin and end in `memory`. step: matrix that advances
+    the state; output matrix of the ports' positions and velocities (2 r, s), with accelerations (3 r, s) where a law
+    reads them; effect of the forces on the state (r, s); and `per_newton`. count: steps per sample; stride (1 where
+    commands are held over all steps, else the number of steps); number of the first sample.
 
     added (s + r,), at (LENGTH or more,), own (OWN_ROWS, items), before (like memory): scratch of the caller; `own`
     keeps the forces from block to block.
@@ -262,7 +262,7 @@ def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     steps, stride, begun = count
     size, r = state.shape[0], ports.shape[1]
     law = laws[places[0, 0]]
-    its, its_memory = numbers[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
+    its, its_memory = parameters[places[0, 2] : places[0, 3]], memory[places[0, 4] : places[0, 5]]
     at[STEP_S] = step_s
     for port in range(r):
         ports[_A, port] = np.nan
@@ -283,5 +283,5 @@ def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
             if places.shape[0] == 1:
                 _solve_force(law, its, its_memory, places[0, 1], per_newton, ports, at)
             else:
-                _solve_forces(laws, places, numbers, memory, per_newton, ports, own, at, before)
+                _solve_forces(laws, places, parameters, memory, per_newton, ports, own, at, before)
             _apply_forces(by_force, state, ports)

@@ -37,7 +37,7 @@ class Forces:
     laws: tuple[object, ...]
     places: Integers
     """(items, 6)"""
-    numbers: FloatArray
+    parameters: FloatArray
     memory: FloatArray
     acceleration: bool
     """Whether a law reads accelerations."""
@@ -105,7 +105,7 @@ def forced_stepping(linear: LinearSteps, forces: Forces, steps: int, stride: int
 
     def run(rows: FloatArray, first: int) -> None:
         step_mechanism(
-            forces.laws, forces.places, forces.numbers, memory, step, rows,
+            forces.laws, forces.places, forces.parameters, memory, step, rows,
             commands[first * stride : first * stride + len(rows)], ports, state, (steps, stride, first),
             linear.step_s, *scratch,
         )  # fmt: skip

@@ -1,4 +1,8 @@
-"""Averages of a frequency response over bins of equal width in octaves."""
+"""Averages of a frequency response over bins of equal width in octaves.
+
+Lines of a discrete Fourier transform are equally spaced in Hz; a plot over log frequency, and a comparison of records
+of different length, need averages of equal width in octaves.
+"""
 
 from dataclasses import dataclass
 
@@ -10,17 +14,20 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OctaveBins:
-    """Mean response per bin, (bins, ...). Where lines are further apart than a bin is wide, a bin is a line."""
+    """Means per bin. Where lines are further apart than a bin is wide, a bin is a line; empty bins are left out."""
 
     frequency_hz: FloatArray
+    """(bins,): arithmetic mean of the lines' frequencies."""
     response: ComplexArray
-    """Mean of complex values: noise averages out; so does part of a response whose phase changes within a bin."""
+    """(bins, outputs, inputs): mean of the complex values, so that noise averages out; so does part of a response whose
+    phase changes within a bin."""
     lowest: FloatArray
-    """Magnitude of the weakest line of each entry."""
+    """(bins, outputs, inputs): magnitude of the weakest line."""
     highest: FloatArray
-    """Magnitude of the strongest line of each entry."""
+    """(bins, outputs, inputs): magnitude of the strongest line."""
     noise_variance: FloatArray
-    """Noise variance of single lines, averaged."""
+    """(bins, outputs, inputs): noise variance E|error|² of a single line, averaged; that of the mean is `lines` times
+    smaller."""
     lines: FloatArray
     """(bins,): number of lines in each."""
     reliable: BoolArray
@@ -28,7 +35,8 @@ class OctaveBins:
 
 
 def octave_bins(response: FrequencyResponse, octaves: float) -> OctaveBins:
-    """Average a response over bins of this width in octaves. It must have lines."""
+    """Average a response over bins of this width in octaves, which begin at its first line. It must have a line, the
+    first above 0 Hz, in ascending order."""
     number = np.floor(np.log2(response.frequency_hz / response.frequency_hz[0]) / octaves).astype(np.int64)
     _, starts, counts = np.unique(number, return_index=True, return_counts=True)
     lines = counts.astype(np.float64)

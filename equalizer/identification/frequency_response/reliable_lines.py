@@ -10,12 +10,13 @@ from equalizer.identification.frequency_response.frequency_response import BoolA
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LEAST_INDEPENDENCE = 0.1
-"""Least singular value of the matrix of excited directions, each of unit length."""
+"""Least singular value of the matrix whose columns are the excited directions, each of unit length: 1 where they are
+orthogonal, 0 where one lies in the span of the others. By hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReliabilityRules:
-    """Thresholds of coherence, frequency and energy below which a line counts as not reliable."""
+    """Thresholds of coherence, frequency and energy below which a line counts as not reliable. All by hand."""
 
     least_coherence: float = 0.5
     """Least coherence, of the worst output."""
@@ -47,9 +48,9 @@ def judge_lines(
             f"Below {rules.spring_margin * spring_hz:.2f} Hz lines are not reliable: the virtual spring "
             f"({spring_hz:g} Hz) takes most of the excitation away there."
         )
-    dark = ~excited & ~stiff
-    if dark.any():
-        remarks.append(f"Not reliable for want of excitation in every direction: {_spans(frequency_hz, dark)}.")
+    unexcited = ~excited & ~stiff
+    if unexcited.any():
+        remarks.append(f"Not reliable for want of excitation in every direction: {_spans(frequency_hz, unexcited)}.")
     worst = np.min(np.where(np.isnan(coherence), 1.0, coherence), axis=1, initial=1.0)
     noisy = (worst < rules.least_coherence) & excited & ~stiff
     if noisy.any():
@@ -57,7 +58,7 @@ def judge_lines(
             f"Not reliable, because noise is more than {100 * (1 - rules.least_coherence):g} % of an output's power: "
             f"{_spans(frequency_hz, noisy)}."
         )
-    return Judgement(~(stiff | dark | noisy), tuple(remarks))
+    return Judgement(~(stiff | unexcited | noisy), tuple(remarks))
 
 
 def excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_energy_db: float) -> BoolArray:

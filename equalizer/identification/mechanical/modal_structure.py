@@ -9,41 +9,50 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.signal import FloatArray
 
 _WIDEST = 10.0
-"""Ratio by which a mode may lie outside the band."""
-_LARGEST_RATIO = 100.0
-"""Largest damping ratio."""
+"""Ratio by which a mode's frequency may lie outside the band. By hand."""
+_LEAST_RATIO, _LARGEST_RATIO = 1e-4, 100.0
+"""Least and largest damping ratio of a mode; a rigid body on weak springs has the largest. By hand."""
 _WEAKEST = 1e-9
 """Least strength of a mode, relative to the strongest."""
 _SHARE = 0.5
+"""Largest strength at the force of a further mode, relative to the strongest of the rigid body; its
+readings are scaled up by what it loses. By hand."""
 _ALIKE = 1.5
 """Frequencies within this ratio of the slowest are those of the rigid body."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalStructure:
-    """Per mode: log of its frequency over `speed_scale`, log of its damping ratio, m entries of the shape at the
-    commands, p entries at the sensors; modal masses are one in `mass_scale`."""
+    """Unknowns per mode: log of its frequency over `speed_scale`, log of its damping ratio, m entries of the shape at
+    the commands, p entries at the sensors; modal masses are one in `mass_scale`. The position's response is
+
+        Y(s) = sum over modes of  c b' / (s² + 2 ratio w s + w²)          c (p,), b (m,): shapes over sqrt(mass_scale)
+    """
 
     inputs: int
     outputs: int
     quantity: str
     modes: int
     mass_scale: float
+    """kg, or kg m² of a rotational model: keeps the shapes' entries near one."""
     speed_scale: float
-    """rad/s"""
+    """rad/s: keeps the frequencies' logarithms near zero."""
     sensor: SensorLimits
     actuator: ActuatorLimits
     rotational: bool
 
     @property
     def parameters(self) -> int:
+        """Number of unknowns."""
         return self.modes * (2 + self.inputs + self.outputs)
 
     @property
     def coordinates(self) -> int:
+        """Number of coordinates of the model: one per mode."""
         return self.modes
 
     def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
+        """The model in modal coordinates. unknowns: (parameters,), mode by mode."""
         each = unknowns.reshape(self.modes, -1)
         speed, ratio = self.speed_scale * np.exp(each[:, 0]), np.exp(each[:, 1])
         return MechanicalModel(
@@ -60,11 +69,12 @@ class ModalStructure:
         )
 
     def bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper limits (parameters,) of the unknowns, for a fit in this band; shapes have none."""
         low = np.full((self.modes, 2 + self.inputs + self.outputs), -np.inf)
         high = -low
         low[:, 0] = np.log(2 * np.pi * band_hz[0] / _WIDEST / self.speed_scale)
         high[:, 0] = np.log(2 * np.pi * band_hz[1] * _WIDEST / self.speed_scale)
-        low[:, 1], high[:, 1] = np.log(1e-4), np.log(_LARGEST_RATIO)
+        low[:, 1], high[:, 1] = np.log(_LEAST_RATIO), np.log(_LARGEST_RATIO)
         return low.ravel(), high.ravel()
 
 

@@ -1,4 +1,9 @@
-"""Candidates of the search: starting models, each refined to a local optimum, and the choice among them."""
+"""Candidates of the search: starting models, each refined to a local optimum, and the choice among them.
+
+The cost of poles and shapes has many local minima. Subspace methods give starting models without iteration: one over
+frequency lines with a warped axis, one over time records (canonical variates), each for several horizons. Each is
+refined on lines averaged in bins, where the cost is smooth and cheap, then on all lines.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,11 +27,14 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray
 
 LINES_PER_BIN = 5
-"""Lines that are averaged for the first refinement, in a narrow band."""
+"""Lines that are averaged to a bin for the first refinement, in a narrow band. By hand."""
 OCTAVE_SHARE = 1 / 40
-"""Width of a bin of a wide band."""
+"""Width of a bin of a wide band, in octaves. By hand."""
 LARGEST_GAIN = 100.0
-"""Largest gain outside the band over that inside: above it, the model fits by cancellation of large modes."""
+"""Largest gain outside the band over that inside: above it, the model fits by cancellation of large modes.
+By hand."""
+GAIN_POINTS = 2000
+"""Frequencies from 0 to half the sample rate at which the largest gain is looked for."""
 MOST_STEPS, LAST_STEPS = (60, 20, 20), 4
 """Steps of the refinement on averaged lines, by pass, and on all lines at the end."""
 
@@ -46,7 +54,7 @@ class Candidate:
     name: str
     fitted: FittedForm
     cost: float
-    """Squared residual over noise variance, mean over all entries of all lines: about 1 at the noise."""
+    """Squared residual over noise variance, mean over all entries of all lines: about 1 where only noise is left."""
     outside_gain: float
     """Largest gain outside the band over the largest inside."""
     radius: Radius
@@ -54,6 +62,7 @@ class Candidate:
 
     @property
     def sane(self) -> bool:
+        """Whether its gain outside the band is acceptable."""
         return self.outside_gain <= LARGEST_GAIN
 
 
@@ -117,7 +126,7 @@ def bins_about(found: FittedForm, lines: WeightedLines, settings: Identification
 
 def outside_gain(found: FittedForm, lines: WeightedLines) -> float:
     """The largest response anywhere over the largest on the lines."""
-    every = np.exp(1j * np.linspace(0, np.pi, 2000))
+    every = np.exp(1j * np.linspace(0, np.pi, GAIN_POINTS))
     return float(_largest_gain(found.response(every)) / _largest_gain(found.response(lines.z)))
 
 

@@ -1,7 +1,17 @@
 """Maximum-likelihood fit of a model to lines with known noise, by Levenberg-Marquardt.
 
-B and D enter linearly and are solved for at every step (variable projection, Golub and Pereyra 1973, with Kaufman's
-Jacobian), so the search is over the poles and the output matrix only.
+Theory of operation. With known noise of each entry of the response, maximum likelihood is weighted least squares,
+
+    J = sum over lines, outputs, inputs of |(G(z) - Y) / sd|²,        G(z) = C (z I - A)⁻¹ B + D
+
+B and D enter linearly. At given poles and C they are solved for (variable projection, Golub and Pereyra 1973), so that
+the search is over poles and C alone; the Jacobian of what is left is the partial one, projected off the span of B and D
+(Kaufman 1975). A step solves (J'J + damping diag(J'J)) step = -J'r. The damping follows the ratio of the cost's fall to
+the fall that the linear model predicts (Nielsen 1999): it falls to a third after a good step and doubles ever faster
+after bad ones. Poles that a step moves out of the allowed radius are put back inside: the model is always stable.
+
+References: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973), 413; Kaufman, BIT 15 (1975), 49; Nielsen, Damping
+Parameter in Marquardt's Method, report IMM-REP-1999-05, Technical University of Denmark.
 """
 
 from dataclasses import dataclass
@@ -14,7 +24,8 @@ from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 RANK = 1e-11
-"""Directions weaker than this share of the strongest are left at zero rather than filled with noise."""
+"""Singular value, relative to the largest, below which a direction of B and D is set to zero: it would be filled with
+noise."""
 
 
 def solve_input_matrices(form: ModalForm, lines: WeightedLines) -> tuple[FloatArray, FloatArray]:
@@ -49,6 +60,10 @@ def _least_squares(phi: FloatArray, y: FloatArray) -> FloatArray:
     solved: FloatArray = np.linalg.lstsq(phi / size, y, rcond=RANK)[0] / size
     return solved
 
+
+FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
+"""Damping of the first step, and the largest, at which no step lowers the cost any more; relative to the diagonal of
+J'J."""
 
 LEAST_GAIN = 1e-7
 """Relative fall of the cost in a step below which the search ends."""
@@ -89,7 +104,7 @@ class _Point:
 def refine(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: int = 60) -> FittedForm:
     """Local optimum near a form by Levenberg-Marquardt, with all poles within the radius (for all blocks, or each)."""
     point = _evaluate_form(form, lines)
-    damping, growth = 1e-3, 2.0
+    damping, growth = FIRST_DAMPING, 2.0
     for _ in range(most_steps):
         jacobian = _jacobian(point, lines)
         normal = np.einsum("jra,jrb->ab", jacobian, jacobian, optimize=True)
@@ -97,7 +112,7 @@ def refine(form: ModalForm, lines: WeightedLines, radius: Radius, most_steps: in
         while True:
             step = _levenberg_marquardt_step(normal, gradient, damping)
             trial = _evaluate_form(_apply_step(point.form, step, radius), lines)
-            if trial.cost < point.cost or damping > 1e12:
+            if trial.cost < point.cost or damping > LARGEST_DAMPING:
                 break
             damping, growth = damping * growth, growth * 2
         gained = point.cost - trial.cost
@@ -120,6 +135,7 @@ def complete_form(form: ModalForm, lines: WeightedLines) -> FittedForm:
 
 
 def _levenberg_marquardt_step(normal: FloatArray, gradient: FloatArray, damping: float) -> FloatArray:
+    """Step from J'J and J'r, solved in parameters that are scaled to a unit diagonal."""
     scale = np.diag(normal) + 1e-300
     root = np.sqrt(scale)
     scaled = normal / root[:, None] / root
@@ -134,6 +150,7 @@ def _apply_step(form: ModalForm, step: FloatArray, radius: Radius) -> ModalForm:
 
 
 def _evaluate_form(form: ModalForm, lines: WeightedLines) -> _Point:
+    """Project the measured response on the span of B and D (QR): what is left is the residual at these poles and C."""
     phi = weighted_regressors(form, lines)
     size = np.linalg.norm(phi, axis=1, keepdims=True)
     size[size == 0] = 1.0

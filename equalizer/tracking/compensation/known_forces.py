@@ -22,43 +22,47 @@ def _smooth_sign(velocity: FloatArray, slip: float) -> FloatArray:
     return np.asarray(np.tanh(velocity / slip))
 
 
-def _coulomb(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
-    return numbers["level"] * _smooth_sign(v, slip)
+def _coulomb(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    return parameters["level"] * _smooth_sign(v, slip)
 
 
-def _asymmetric_friction(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
-    return np.where(v > 0, numbers["level_positive"], numbers["level_negative"]) * _smooth_sign(v, slip)
+def _asymmetric_friction(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    return np.where(v > 0, parameters["level_positive"], parameters["level_negative"]) * _smooth_sign(v, slip)
 
 
-def _position_dependent_friction(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
-    level = numbers["level"] * (1 + numbers["slope_per_m"] * x + numbers["bend_per_m2"] * x**2)
+def _position_dependent_friction(
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+) -> FloatArray:
+    level = parameters["level"] * (1 + parameters["slope_per_m"] * x + parameters["bend_per_m2"] * x**2)
     return np.asarray(np.maximum(level, 0.0) * _smooth_sign(v, slip))
 
 
-def _stribeck(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
-    level = numbers["coulomb"] + (numbers["static"] - numbers["coulomb"]) * np.exp(-((v / numbers["speed"]) ** 2))
+def _stribeck(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    level = parameters["coulomb"] + (parameters["static"] - parameters["coulomb"]) * np.exp(
+        -((v / parameters["speed"]) ** 2)
+    )
     return np.asarray(level * _smooth_sign(v, slip))
 
 
-def _presliding_hysteresis(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+def _presliding_hysteresis(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
     """Dahl's bristle by implicit steps: it bends with the motion and slips at the level."""
-    longest, bent = numbers["level"] / numbers["stiffness"], 0.0
+    longest, bent = parameters["level"] / parameters["stiffness"], 0.0
     bends = np.empty_like(x)
     for k, travel in enumerate(np.diff(x, prepend=x[:1])):
         bent = bends[k] = (bent + travel) / (1 + abs(travel) / longest)
-    return np.asarray(numbers["stiffness"] * bends)
+    return np.asarray(parameters["stiffness"] * bends)
 
 
-def _quadratic_damping(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
-    return numbers["coefficient"] * v * np.abs(v)
+def _quadratic_damping(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    return parameters["coefficient"] * v * np.abs(v)
 
 
-def _hardening_stiffness(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
-    return np.asarray(numbers["k3"] * x**3)
+def _hardening_stiffness(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    return np.asarray(parameters["k3"] * x**3)
 
 
-def _asymmetric_stiffness(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
-    return np.asarray(numbers["k2"] * x**2)
+def _asymmetric_stiffness(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    return np.asarray(parameters["k2"] * x**2)
 
 
 LAWS: dict[str, Law] = {
@@ -74,7 +78,7 @@ LAWS: dict[str, Law] = {
 
 
 def equivalent_impedance(
-    law: Law, numbers: Mapping[str, float], frequency_hz: FloatArray, speed: FloatArray, slip_share: float
+    law: Law, parameters: Mapping[str, float], frequency_hz: FloatArray, speed: FloatArray, slip_share: float
 ) -> ComplexArray:
     """Sinusoidal describing function (lines,), N s/m: force over velocity at the fundamental, for velocity amplitudes
     `speed` (lines,), m/s, above zero; from the second of two cycles, so that a bristle has settled.
@@ -85,7 +89,7 @@ def equivalent_impedance(
     for place, line in enumerate(chosen):
         v = speed[line] * np.sin(angle)
         x = -speed[line] / (2 * np.pi * frequency_hz[line]) * np.cos(angle)
-        force = law(numbers, x, v, slip_share * speed[line])[CYCLE:]
+        force = law(parameters, x, v, slip_share * speed[line])[CYCLE:]
         # sin is -i / 2 of the positive line, so that a force along the velocity gives a positive real part.
         found[place] = 2j * np.mean(force * np.exp(-1j * angle[CYCLE:])) / speed[line]
     at = frequency_hz[chosen]

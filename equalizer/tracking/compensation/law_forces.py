@@ -57,7 +57,7 @@ def compensating_force(
 def single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceAgainst:
     """The law along a sinusoid of this axis while the others rest, as `equivalent_impedance` takes it."""
 
-    def against(numbers: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    def against(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
         wave = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
         still = np.zeros((len(x), len(letters)))
         motion = PlannedMotion(still, still.copy(), still.copy())

@@ -10,7 +10,7 @@ from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray, Signal
 
 STEP_TOLERANCE = 0.01
-"""Largest relative deviation of a time step from the mean one at a constant rate."""
+"""Largest relative deviation of a time step from the mean step, for the rate to count as constant. By hand."""
 RATE_TOLERANCE = 1e-5
 """Relative distance to a whole number of hertz to which a rate is rounded, because printed time stamps are rounded."""
 
@@ -33,6 +33,7 @@ TRAJECTORY = TableKind("trajectory", ("time_s", "ax", "ay", "az"), "acceleration
 FORCES = TableKind("forces", ("time_s", "fx", "fy", "fz"), "force", "N")
 TRANSIENT = TableKind("transient", ("time_s", "a"), "acceleration", "m/s^2")
 """Acceleration along one direction, which is chosen when it is played."""
+# A table is told by its header, so no two kinds may share one.
 TABLE_KINDS = (TRAJECTORY, FORCES, TRANSIENT)
 
 
@@ -98,6 +99,7 @@ def require_rate(trajectory: Trajectory, rate_hz: float) -> None:
 
 
 def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
+    """(n, columns), n >= 2. Raises TableError with the first lines that are wrong."""
     width = len(kind.header)
     found, problems = [], []
     for line, row in enumerate(rows, start=2):
@@ -120,6 +122,7 @@ def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
 
 
 def _find_rate_hz(time_s: FloatArray) -> float:
+    """Sample rate of rows at these times (n,), rounded to whole hertz within `RATE_TOLERANCE`. Raises TableError."""
     steps = np.diff(time_s)
     mean = float(time_s[-1] - time_s[0]) / len(steps)
     if mean <= 0 or (steps <= 0).any():

@@ -1,4 +1,14 @@
-"""A recorded transient that starts at a contact: forces are causal, and the resulting loss of accuracy is stated."""
+"""A recorded transient that starts at a contact: forces are causal, and the resulting loss of accuracy is stated.
+
+The forces for a transient a(t) along a normal n are linear in n: F(t) = sum_i n_i F_i(t), with the LQR solution F_i for
+the transient along axis i stored beforehand. So is the error E(t) = sum_i n_i E_i(t) of the predicted acceleration, and
+its relative square in the model's band is the quadratic form
+
+    |E|² / |a|² = n' S n,        S_ij = <E_i, E_j> / |a|²
+
+whose largest eigenvalue is the worst normal's. A force that may begin before the contact can prepare the device (the
+optimal tracker is not causal); at an unforeseen contact it cannot. `early_deviation` says how much that costs.
+"""
 
 from dataclasses import dataclass
 
@@ -21,16 +31,17 @@ class CausalStart:
     live: TurningTransient
     """The same tick by tick, for a normal that changes while it is played."""
     deviation: FloatArray
-    """(p, p): n' deviation n is the squared relative error for the normal n."""
+    """(p, p): S above, so that n' S n is the squared relative error for the unit normal n."""
     early_deviation: FloatArray
     """Likewise for forces that may begin before the contact."""
 
     def error(self, normal: FloatArray) -> float:
-        """Relative error of the predicted acceleration in the model's band."""
+        """Relative error of the predicted acceleration in the model's band. normal: (p,), of any length above 0. Raises
+        TrackingError for any other."""
         return _relative_error(self.deviation, normal)
 
     def early_error(self, normal: FloatArray) -> float:
-        """The error if the forces were allowed to begin before the contact."""
+        """The error if the forces were allowed to begin before the contact. normal: as for `error`."""
         return _relative_error(self.early_deviation, normal)
 
     @property
@@ -40,8 +51,9 @@ class CausalStart:
 
 
 def causal_start(problem: TrackingProblem, recording: FloatArray, padding: Padding | None = None) -> CausalStart:
-    """Prepare a recording (N,), the acceleration along the normal from the contact on. padding: the time after it, to
-    come to rest, is played too; that before it serves the comparison only. None = 0.3 s each.
+    """Prepare a recording (N,), the acceleration (m/s²) along the normal from the contact on, at the problem's rate.
+    padding: the time after it, to come to rest, is played too; that before it serves the comparison only. None = 0.3 s
+    each.
 
     Raises TrackingError where the recording has nothing in the model's band.
     """
@@ -62,6 +74,7 @@ def _early_deviation(problem: TrackingProblem, played: FloatArray, room: Padding
 
 
 def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatArray) -> FloatArray:
+    """(p, p): S of the module's theory. recording: (N,), with its padding."""
     p, rate_hz, band_hz = problem.outputs, problem.sample_rate_hz, problem.band_hz
     level = float(np.linalg.norm(band_spectrum(recording[:, np.newaxis], rate_hz, band_hz)))
     if not level > 0:

@@ -14,8 +14,8 @@ import numpy as np
 
 from analysis.diagnosis.document import diagnosis_from_json
 from analysis.diagnosis.next_experiment.experiment_menu import Experiment, experiment_menu
-from analysis.evaluation.proof.follow_up import FollowUp
-from analysis.evaluation.proof.outcome import Outcome
+from analysis.evaluation.blind_test.follow_up import FollowUp
+from analysis.evaluation.blind_test.outcome import Outcome
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import Workers, ask_engine, forget_recording, is_answered
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from analysis.evaluation.proof.wording import answer_text, concealed_text, figure_text, strength_text
-from study.evaluation.bank.prove import Proof
+from analysis.evaluation.blind_test.wording import answer_text, concealed_text, figure_text, strength_text
+from study.evaluation.bank.prove import BlindTest
 
 
-def proof_lines(proof: Proof) -> Iterator[str]:
+def proof_lines(proof: BlindTest) -> Iterator[str]:
     """Figures, misses and controls as terminal lines."""
     score = proof.score
     yield f"{len(score.misses)} misses in {len(proof.outcomes)} cases"
@@ -31,7 +31,7 @@ def proof_lines(proof: Proof) -> Iterator[str]:
     yield f"Everything is in {proof.folder.path}"
 
 
-def control_lines(proof: Proof) -> Iterator[str]:
+def control_lines(proof: BlindTest) -> Iterator[str]:
     """Result of the controls; failed ones are listed one by one."""
     if proof.controls:
         yield f"{sum(each.held for each in proof.controls)} of {len(proof.controls)} controls held"
@@ -40,7 +40,7 @@ def control_lines(proof: Proof) -> Iterator[str]:
             yield f"  {control.name}: {', then '.join(control.said)}"
 
 
-def remarks(proof: Proof) -> Iterator[str]:
+def remarks(proof: BlindTest) -> Iterator[str]:
     """What limits this blind test: cases left out or unanswered, or answers from several versions of the code."""
     if proof.left_out:
         yield (
@@ -59,12 +59,12 @@ def remarks(proof: Proof) -> Iterator[str]:
         yield f"The answers come from {len(proof.engines)} versions of the diagnosis: run the bank anew for a figure."
 
 
-def unanswered(proof: Proof) -> int:
+def unanswered(proof: BlindTest) -> int:
     """Number of cases whose process died each time: a diagnosis that failed by itself says how long it took."""
     return sum(each.diagnosis is None and math.isnan(each.seconds) for each in proof.outcomes)
 
 
-def summary(proof: Proof) -> dict[str, Any]:
+def summary(proof: BlindTest) -> dict[str, Any]:
     """The summary as a JSON-serialisable mapping."""
     return {
         "folder": str(proof.folder.path),

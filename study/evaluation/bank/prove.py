@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from analysis.diagnosis.document import diagnosis_from_json
-from analysis.evaluation.proof.controlled import ControlOutcome
-from analysis.evaluation.proof.follow_up import FollowUp
-from analysis.evaluation.proof.outcome import Concealed, Outcome
-from analysis.evaluation.proof.score import Score, score
+from analysis.evaluation.blind_test.controlled import ControlOutcome
+from analysis.evaluation.blind_test.follow_up import FollowUp
+from analysis.evaluation.blind_test.outcome import Concealed, Outcome
+from analysis.evaluation.blind_test.score import Score, score
 from study.errors import resumable
 from study.evaluation.bank.ask_engine import is_answered
 from study.evaluation.bank.follow_up import NEXT, follow_up
@@ -52,7 +52,7 @@ CONTROL_TURNS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Proof:
+class BlindTest:
     """Result of a bank of concealed cases, with its score, follow-ups and controls."""
 
     folder: ProofFolder
@@ -71,7 +71,7 @@ class Proof:
     """Cases of the second physics engine, where it is not installed."""
 
 
-def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> Proof:
+def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> BlindTest:
     """Run or continue the bank in the folder `path`. Resumable. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
     numbers = [each.number for each in drawable_cases(plan)]
@@ -88,7 +88,7 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
             lambda done, of: on_progress("following up", done, of),
         )
         controls = _controls(path, plan, options, on_progress)
-    return Proof(
+    return BlindTest(
         folder, plan, seal, outcomes, score(outcomes, followed), engines(folder, names), _other_digests(path), controls,
         followed, plan.cases - len(numbers),
     )  # fmt: skip

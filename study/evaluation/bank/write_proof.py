@@ -8,13 +8,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import analysis.diagnosis
-from analysis.evaluation.proof.outcome import Outcome
-from analysis.evaluation.proof.score import main_error
-from analysis.figures.proof_pictures import proof_pictures
-from analysis.reports.proof_report import ProofFacts, render_proof_report
+from analysis.evaluation.blind_test.outcome import Outcome
+from analysis.evaluation.blind_test.score import main_error
+from analysis.figures.blind_test_pictures import blind_test_pictures
+from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
 from study.evaluation.bank.answer_cases import engine_digest
 from study.evaluation.bank.proof_summary import remarks
-from study.evaluation.bank.prove import Proof
+from study.evaluation.bank.prove import BlindTest
 from study.local_clock import local_now
 from study.store.disk.csv_rows import rows_to_csv
 from study.store.disk.json_document import read_json, write_json
@@ -66,7 +66,7 @@ class FigureRow:
     of: int
 
 
-def write_proof(proof: Proof) -> None:
+def write_proof(proof: BlindTest) -> None:
     """Write document, table and page, replacing earlier ones. Raises StudyError."""
     folder, at = proof.folder.path, answering_commit(proof)
     score = proof.score
@@ -88,18 +88,18 @@ def write_proof(proof: Proof) -> None:
     write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
     rows = [_row(outcome, outcome in score.misses) for outcome in proof.outcomes]
     write_text(folder / TABLE, rows_to_csv(rows, CaseRow), overwrite=True)
-    pictures = proof_pictures(proof.outcomes, score.calibration)
+    pictures = blind_test_pictures(proof.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
-    facts = ProofFacts(
+    facts = BlindTestFacts(
         seeds(proof), proof.seal, at, proof.engines, tuple(remarks(proof)), proof.controls, proof.followed
     )
-    page = render_proof_report(
+    page = render_blind_test_report(
         proof.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, local_now()
     )
     write_text(folder / PAGE, page, overwrite=True)
 
 
-def write_table(path: Path, proof: Proof) -> None:
+def write_table(path: Path, proof: BlindTest) -> None:
     """Write the figures and what they were measured on as a small table that can be kept beside the code. Raises
     StudyError."""
     calibration = proof.score.calibration
@@ -128,7 +128,7 @@ def misses_table(path: Path) -> Path:
     return path.with_name(f"{path.stem}-misses{path.suffix}")
 
 
-def answering_commit(proof: Proof) -> str:
+def answering_commit(proof: BlindTest) -> str:
     """The commit recorded when the answers were first written; the current one where the same code gave them."""
     document = proof.folder.path / DOCUMENT
     if document.exists():
@@ -138,7 +138,7 @@ def answering_commit(proof: Proof) -> str:
     return commit() if proof.engines in ((), (engine_digest(),)) else "unknown: the code has changed since"
 
 
-def seeds(proof: Proof) -> str:
+def seeds(proof: BlindTest) -> str:
     """First and last seed of the cases, as text: "1 to 500"."""
     return f"{proof.plan.seed} to {proof.plan.seed + proof.plan.cases - 1}"
 

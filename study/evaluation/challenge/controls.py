@@ -30,7 +30,7 @@ class ControlInput:
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """claim: how the answers are judged, in `proof.controlled`. draw: makes the inputs from a seed and a rig."""
+    """claim: how the answers are judged, in `blind_test.controlled`. draw: makes the inputs from a seed and a rig."""
 
     name: str
     claim: str

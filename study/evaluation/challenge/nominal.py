@@ -18,8 +18,11 @@ from study.evaluation.challenge.sensor import BANDWIDTH_HZ, NOISE_MPS2, RANGE_MP
 from study.evaluation.challenge.sensor_kernel import one_pole
 
 MODES_TOLERANCE = 0.005
+"""Tolerance of the modes of every model of the challenge, relative."""
 WIDE = Tolerance(0.05, 3.0, 100.0, MODES_TOLERANCE)
+"""Tolerance of a re-tuned model: mass (kg), damping (N s/m), stiffness (N/m), modes."""
 ROUNDS, SLOPES_ANEW = 6, 2
+"""Gauss-Newton steps of the re-tuning, and in how many of the first the slopes are computed anew."""
 DECIMALS = 8
 """Significant digits of the matrices in the file."""
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.evaluation.proof.lab_kit import CHANGES, CHANGES_BY_NAME, NOTHING, Label
+from analysis.evaluation.blind_test.lab_kit import CHANGES, CHANGES_BY_NAME, NOTHING, Label
 from equalizer.plant.mechanical_model import suggest_word
 from study.errors import StudyError
 from study.store.disk.csv_rows import CsvError, rows_from_csv, rows_to_csv

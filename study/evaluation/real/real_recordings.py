@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.search.time_budget import CountedBudget
 from analysis.diagnosis.types import TimeBudget
-from analysis.evaluation.proof.injected import InjectedOutcome
+from analysis.evaluation.blind_test.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import StudyError, UserInterruptError, WrongUseError, resumable
 from study.evaluation.bank.ask_engine import Workers

@@ -2,7 +2,7 @@
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.unit_wording import error_text
-from analysis.evaluation.proof.injected import injected_figures
+from analysis.evaluation.blind_test.injected import injected_figures
 from analysis.reports.injected_section import figure_text
 from analysis.reports.real_report import VERDICT_WORDS
 from study.evaluation.real.write_real import WrittenReal

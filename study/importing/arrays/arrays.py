@@ -20,6 +20,7 @@ from study.store.disk.file_errors import DAMAGED, CannotReadError, UnusableFileE
 from study.store.disk.hdf5_file import is_hdf5
 
 Array = npt.NDArray[Any]
+# File types by the reader that takes them; `KINDS` is the list for error texts.
 KINDS = ".csv, .txt, .tsv, .dat (tables), .xlsx, .xlsm, .json, .jsonl, .ndjson, .npz, .npy, .mat, .h5 and .hdf5"
 TABLES = (".csv", ".txt", ".tsv", ".dat")
 WORKBOOKS = (".xlsx", ".xlsm")
@@ -29,7 +30,9 @@ FOREIGN = (*TABLES, *WORKBOOKS, *RECORDS, ".npz", ".npy", ".mat")
 """File types that never hold our own recordings; HDF5 may."""
 
 _CHECK = "Check the file; nothing else can be read from it."
+"""Remedy where a file is damaged or of the wrong kind."""
 MEND = "Do that, and import again; docs/importing.md lists the keys of a map."
+"""Remedy where the message itself says what to do: cause; remedy."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +58,8 @@ def left_out(array: Array) -> str:
 
 
 def read_arrays(path: Path, table: CsvMap) -> Arrays:
-    """Read a file. Raises CannotReadError, ImportRefusedError."""
+    """Read all arrays of a file, whose type is told by its ending. table: how a table of text is laid out (separator,
+    decimal mark, header). Raises CannotReadError, ImportRefusedError."""
     try:
         open_regular(path).close()
     except OSError as problem:
@@ -66,6 +70,7 @@ def read_arrays(path: Path, table: CsvMap) -> Arrays:
         raise ImportRefusedError(path.name, refused.happened, _CHECK) from refused
     except DAMAGED as problem:
         words = str(problem) or type(problem).__name__
+        # Our own messages are "cause; remedy", those of a library name a cause alone.
         raise ImportRefusedError(path.name, words, MEND if "; " in words else _CHECK) from problem
     if not found.by_name:
         raise ImportRefusedError(path.name, "it holds no arrays", "Check that it is the right file.")

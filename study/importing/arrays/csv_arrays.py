@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 MOST_ROWS = 20_000_000
 """Most rows of a table: five hours at 1 kHz."""
 MOST_COLUMNS = 10_000
+"""Most columns of a table: a file with more is no recording, and would fill the memory."""
 _LONGEST_LINE = 2**20
 """Longest line in characters: a hundred for each of the most columns."""
 _LONGEST_SHOWN = 60

@@ -21,6 +21,7 @@ Lookup = Callable[[str], Value]
 """Value of a name. Raises ImportProblemError for an unknown one."""
 
 LONGEST = 2000
+"""Longest expression of a map, in characters: parsing takes time and depth of the stack."""
 _CALL_COSTS = 20
 """Cost of a function call in additions: the slowest ones sort, or compute a sine."""
 

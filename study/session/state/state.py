@@ -1,4 +1,7 @@
-"""State of a session at one moment, folded from events by `study.session.state.fold`."""
+"""State of a session at one moment, folded from events by `study.session.state.fold`.
+
+The state is a value and holds nothing that is not in the log: the same log gives the same state, after a crash, too.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -29,13 +32,17 @@ class SessionState:
     """Index of the current run; len(runs) when all are finished."""
     staircase: StaircaseState
     trial: int
+    """Number of the current trial in its run, from 0."""
     attempt: int
+    """Number of the current presentation of that trial, from 0; above 0 where earlier ones were void."""
     presented: TrialPresented | None
     """The open trial, if any."""
     answered: AnswerGiven | None
     """The answer of the open trial, whose measurement is not logged yet."""
     trials: tuple[Trial, ...]
+    """All presentations so far, void ones and an open last one among them."""
     rest_due_s: float
+    """Rest before the next trial (s)."""
     closed: bool
     practice: PracticeState = field(default_factory=PracticeState)
     """Answers of the current run, if it is a practice run; its staircase is then unused."""
@@ -57,6 +64,7 @@ class SessionState:
 
     @property
     def answers(self) -> int:
+        """Number of answers that count."""
         return sum(trial.counts for trial in self.trials)
 
 
@@ -106,7 +114,7 @@ def current_rule(state: SessionState) -> StaircaseRule:
 
 
 def due(state: SessionState) -> Present:
-    """The next trial."""
+    """The next presentation: what the current run's staircase and schedule ask for."""
     place = Place(state.runs[state.run], state.trial, state.attempt, state.staircase)
     return due_trial(state.protocol, state.opened, current_rule(state), place)
 

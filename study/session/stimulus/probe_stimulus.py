@@ -10,6 +10,7 @@ from protocols.definition.probes import FROM_HZ, PERIOD_S, ProbeSettings
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 FADE_S = 0.25
+"""Raised-cosine fade at both ends (s), so that the beginning excites few modes. By hand."""
 HELD_S = FADE_S + PERIOD_S + 0.1
 """Duration until it fades out: the fade, one whole period, and a tenth of a second of margin for the program."""
 PHASES_SEED = 16

@@ -25,6 +25,7 @@ class Piece:
     number: int
     """Number of its segment in the protocol, from 1."""
     along: str
+    """x, y, z, direction_1, direction_2, or all."""
     unit_vector: tuple[float, float, float] | None
     """None for all axes at once."""
     frequency_hz: float | None = None
@@ -45,7 +46,7 @@ class Piece:
 
 
 def pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[Piece, ...]:
-    """All pieces of the protocol, in order."""
+    """All pieces of the protocol in the order of its segments, and the whole as often as the protocol repeats it."""
     once: list[Piece] = []
     for number, segment in enumerate(protocol.segments, start=1):
         match segment:

@@ -1,4 +1,12 @@
-"""Stimulus of a trial from its level: one loop of whole periods along one of the two directions."""
+"""Stimulus of a trial from its level: one loop of whole periods along one of the two directions.
+
+The force (N), or the wanted acceleration (m/s²) where stimuli are equalized, is
+
+    w(t) = A sin(2 pi f t) d,        d = (cos a, sin a) in the protocol's plane, a = symmetry + 45° or - 45°
+
+The two directions are orthogonal, and mirror images of each other in the device's line of symmetry, so that the device
+itself favours neither. The loop holds whole periods: it is repeated as long as the participant feels.
+"""
 
 import math
 from dataclasses import replace
@@ -12,10 +20,12 @@ from protocols.definition.study_protocol import StimulusSettings
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 AXES = {"xy": (0, 1), "yz": (1, 2), "zx": (2, 0)}
+"""Indices of a plane's first and second axis; an angle counts from the first towards the second."""
 
 
 def direction_vector(directions: TestDirections, direction: int) -> FloatArray:
-    """Unit vector (3,) of direction 1 or 2: 45° to either side of the line of symmetry."""
+    """Unit vector (3,) of direction 1 or 2: 45° to either side of the line of symmetry. Raises ValueError for any other
+    number."""
     if direction not in (1, 2):
         raise ValueError(f"there are directions 1 and 2, not {direction}")
     angle = math.radians(direction_angle_deg(directions, direction))
@@ -26,7 +36,7 @@ def direction_vector(directions: TestDirections, direction: int) -> FloatArray:
 
 
 def direction_angle_deg(directions: TestDirections, direction: int) -> float:
-    """Angle in the plane, from its first axis towards its second."""
+    """Angle of direction 1 or 2 in the plane (degrees), from its first axis towards its second."""
     return directions.symmetry_deg + (45.0 if direction == 1 else -45.0)
 
 
@@ -65,7 +75,8 @@ def held_stimulus(
     )
     envelope = fade_in(settings, sample_rate_hz)
     loop, onset = equalizer.periodic(wanted), equalizer.onset(wanted, envelope)
-    if onset is not None:  # the loop goes on where its onset ends
+    if onset is not None:
+        # The loop goes on where its onset ends, so its first sample is the one after the envelope.
         loop = replace(loop, samples=np.roll(loop.samples, -len(envelope), axis=0))
     return HeldStimulus(
         loop=loop,

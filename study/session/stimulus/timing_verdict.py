@@ -1,4 +1,5 @@
-"""Timing requirements of a device and the verdict on a computer from a measurement.
+"""Timing requirements of a device and the verdict on a computer from a measurement (`hapteq doctor`, device check).
+Whether a trial is void for its timing is decided elsewhere: `study.workflows.trial.judge_trial`.
 
 A real device does not wait: a loop that wakes up later than one tick has missed it. A simulated device waits for its
 computer, so that lateness is only a warning there. A timing that is too late for a real device is never reported as

@@ -55,28 +55,30 @@ class HomeView:
     models: tuple[str, ...] = ()
     """Files of identified models."""
     qualities: tuple[tuple[str, str], ...] = ()
-    """How good they are, in a few words: (file, words)."""
+    """Held-out errors of the models in a few words: (file, words)."""
 
     def quality_of(self, model: str) -> str:
-        """Empty where it is not known."""
+        """Held-out error of a model's file in words; empty where it is not known."""
         return dict(self.qualities).get(model, "")
 
 
 @dataclass(frozen=True, slots=True)
 class Staircase:
-    """One run as a drawing needs it."""
+    """One run as a drawing needs it; its tuples have one entry per trial that counts."""
 
     title: str
     levels_n: tuple[float, ...]
     correct: tuple[bool, ...]
     reversals: tuple[bool, ...]
+    """Whether the staircase turned at that trial."""
     threshold_n: float | None
+    """None where the run is not complete."""
     cap_n: float
 
 
 @dataclass(frozen=True, slots=True)
 class SessionView:
-    """One session looked at."""
+    """Details of one session."""
 
     line: SessionLine
     facts: tuple[tuple[str, str], ...]
@@ -95,21 +97,24 @@ class SessionView:
 
 @dataclass(frozen=True, slots=True)
 class DiagnosisView:
-    """One diagnosis.json looked at."""
+    """Contents of one `diagnosis.json`."""
 
     path: str
     verdict: str
     sentences: tuple[str, ...]
     """One per named effect, with parameters and intervals."""
     rivals: tuple[str, ...]
+    """Effects that explain the recordings as well, one sentence each."""
     mismatch: tuple[tuple[str, ...], ...]
-    """Rows of text, the first one the header."""
+    """Where model and recording differ. This and the next two: rows of text, the first one the header."""
     fit: tuple[tuple[str, ...], ...]
+    """Errors before, re-tuned and with the effects."""
     remainder: tuple[tuple[str, ...], ...]
+    """What is left above the noise."""
     next_experiment: str
     report: str = ""
     """Path of the report.html beside it; empty where there is none."""
     notes: tuple[str, ...] = ()
     """Remarks, such as how errors were measured and what was re-tuned."""
     candidates: tuple[str, ...] = ()
-    """What was not confirmed, the best first; without one that the verdict says."""
+    """Effects that were not confirmed, the best first, without one that the verdict already states."""

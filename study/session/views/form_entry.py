@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 from study.session.views.form_views import Form, FormField, FormKind, FormReply, find_missing_fields
 
 MOST_CHARACTERS = 500
+"""Longest free text of a field, in characters; more is not taken."""
 CHECKED = (FormKind.CONSENT, FormKind.EXCLUSION)
 """Forms in which changed choices are shown once more before sending, because safety depends on them."""
 STEPS = {"down": 1, "up": -1, "tab": 1, "shift+tab": -1}
+"""Fields that a key moves the cursor by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,12 +154,14 @@ def _press_text(entry: FormEntry, key: str, character: str | None) -> FormEntry 
 
 
 def _write(entry: FormEntry, characters: str) -> FormEntry:
+    """Insert characters at the caret, as far as they fit."""
     text, caret = entry.given[entry.at].answer, entry.given[entry.at].caret
     fitting = characters[: MOST_CHARACTERS - len(text)]
     return _change_field(entry, answer=text[:caret] + fitting + text[caret:], caret=caret + len(fitting))
 
 
 def _choose(entry: FormEntry, choice: int) -> FormEntry:
+    """Choose under the cursor; in forms that safety depends on, a changed choice is noted to be shown once more."""
     field, before = entry.form.fields[entry.at], entry.given[entry.at].answer
     answer = field.choices[choice]
     chosen = _change_field(entry, answer=answer, marked=choice)

@@ -15,6 +15,7 @@ SILENT_AFTER_S = 3.0
 _LIVELY = ("demo", "waiting for the handle", "rest", "probe", "reference")
 """Activities during which the session writes `live.json` continuously; not while a form or a notice is read."""
 HANDLE_AWAY_S = 2.0
+"""Time for which the handle may be away from its place before that is an alarm (s)."""
 UNANSWERED_S = 60.0
 """Answers take seconds; after this time the participant may need help."""
 JUST_NOW_S = 60.0

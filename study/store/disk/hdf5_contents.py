@@ -10,6 +10,7 @@ import h5py
 from study.store.disk.declared_size import PLAIN_BYTES, DeclaredSizeError, SizeLimit
 
 MOST_OBJECTS = 100_000
+"""Most groups and data sets of a file: bounds the time and the memory of a visit."""
 _COMPRESSIONS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_LZF)
 _OBJECT_BYTES = 1024
 """Upper estimate of a Python object for a variable-length text, a reference or a table row."""

@@ -5,6 +5,7 @@ import math
 from typing import Any
 
 DEEPEST = 64
+"""Deepest nesting of a document: deeper ones would overflow the parser's stack."""
 _LONGEST_NUMBER = 40
 """Digits of a whole number: seeds may have 128 bits."""
 

@@ -83,7 +83,8 @@ TROUBLE_FOR_S = 8.0
 
 
 class SittingScreens:
-    """One per sitting. Every reply carries the number of its request, and each is sent once."""
+    """Shows what the engine asks for, and sends the replies. One per sitting. Every reply carries the number of its
+    request, and each is sent once."""
 
     def __init__(
         self,
@@ -108,6 +109,7 @@ class SittingScreens:
         self._preparing: PreparingScreen | None = None
 
     async def hear(self, message: FromEngine) -> None:
+        """Handle one message of the engine, in the order of arrival."""
         match message:
             case Ask():
                 await self._ask(message)

@@ -10,11 +10,13 @@ RIGHT, WRONG, PEAK, VALLEY = "○", "×", "▼", "▲"
 LEGEND = f"{RIGHT} right  {WRONG} wrong  {PEAK} peak  {VALLEY} valley  ┄ cap  ··· threshold"
 
 LABEL_COLUMNS = 8
+"""Columns of the axis's labels, the space behind them included."""
 _LEAST_RANGE = 4.0
 """Smallest ratio of the cap to the lowest drawn level: small movements must not look large."""
 _DOTS_PER_TRIAL = 4.0
 """Upper limit, so that short runs stay short and runs can be compared."""
 _DOTTED = 4
+"""Dots of the canvas from one dot of the threshold's line to the next."""
 _FIRST = (RIGHT, WRONG, VALLEY, PEAK)
 """Where several marks share a cell, the last of these is shown."""
 

@@ -34,6 +34,7 @@ from study.workflows.trial.display import SignOfLife
 GLANCE_S = 0.04
 """Interval of the signs of life; the port allows 100 ms."""
 LOOK_EVERY_S = 0.1
+"""Interval at which a wait looks for requests (s)."""
 UNSHOWN_S = 1.0
 """A shorter wait for the handle is not shown."""
 SILENT_AFTER_S = 0.5

@@ -20,31 +20,32 @@ AT_ONCE = ("ctrl+c", "ctrl+q", "ctrl+z")
 """Remove the force, or suspend: never queued."""
 ROUNDS = 3
 """Rounds of the event loop until a key has had its effect: the key, the message that it becomes, its handler."""
-PATIENCE_S = 1.0
-"""A widget that is busy for longer does not delay further keys."""
+LONGEST_WAIT_S = 1.0
+"""Longest wait for the effects of a key: a widget that is busy for longer does not delay further keys."""
 
 
 class KeysInOrder:
-    """hand_on: the application's own handling of an event."""
+    """A queue in front of an application's handling of events. hand_on: that handling."""
 
     def __init__(self, app: App[Any], hand_on: Callable[[Event], Awaitable[None]]) -> None:
         self._app = app
         self._hand_on = hand_on
         self._waiting: deque[Event] = deque()
         self._settling: asyncio.Task[None] | None = None
-        self._deaf_until_s = float("-inf")
+        self._ignored_until_s = float("-inf")
 
     @property
     def at_work(self) -> bool:
+        """Whether the effects of a key are not complete yet."""
         return self._settling is not None
 
     def forget_earlier(self) -> None:
-        """A new question is shown: keys read before now were meant for something else."""
-        self._deaf_until_s = time.monotonic()
+        """Ignore keys that were pressed before now: a new question is shown, and they were meant for the last one."""
+        self._ignored_until_s = time.monotonic()
 
     async def take(self, event: Event) -> None:
         """Handle every event of the application, in its message loop."""
-        if isinstance(event, Key) and event.key not in AT_ONCE and arrival_s(event) < self._deaf_until_s:
+        if isinstance(event, Key) and event.key not in AT_ONCE and arrival_s(event) < self._ignored_until_s:
             return  # also where it comes back from a widget: its bindings would be those of another screen
         if not _is_typed(event):
             await self._hand_on(event)
@@ -57,7 +58,7 @@ class KeysInOrder:
         self._settling = None
         if self._waiting:
             event = self._waiting.popleft()
-            if isinstance(event, Key) and arrival_s(event) < self._deaf_until_s:
+            if isinstance(event, Key) and arrival_s(event) < self._ignored_until_s:
                 await self._next()
                 return
             before = self._with_the_keyboard()
@@ -66,7 +67,7 @@ class KeysInOrder:
 
     async def _settle(self, before: list[MessagePump]) -> None:
         try:
-            async with asyncio.timeout(PATIENCE_S):
+            async with asyncio.timeout(LONGEST_WAIT_S):
                 await _pass_through(before)
                 for _ in range(ROUNDS - 1):
                     await _pass_through(self._with_the_keyboard())

@@ -32,6 +32,7 @@ from study.tui.widgets.form_question import FormQuestion
 from study.tui.widgets.literal_text import LiteralText
 
 LONGEST_QUOTE = 48
+"""Longest label of a question that is quoted whole, in characters."""
 KEYS = (
     ("1", "choice", "1 2 …", "Choose"),
     ("left", "choice", "← →", "Move"),

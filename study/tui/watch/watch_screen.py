@@ -29,6 +29,7 @@ from study.tui.watch.watch_source import WatchSource
 from study.tui.watch.watch_words import staircase_title
 
 RING_EVERY_S = 4.0
+"""Interval at which the bell repeats while an urgent alarm was not seen (s)."""
 FORGOTTEN_AFTER_S = 10.0
 """An alarm that returns within this time is the same one; later it is new."""
 
@@ -81,6 +82,7 @@ def _key(alarm: Alarm) -> Key:
 
 
 LOOK_EVERY_S = 0.1
+"""Interval at which the session's files are looked at (s)."""
 UNHEARD_AFTER_S = 2.0
 """A session checks for requests twenty times a second."""
 NO_NEWS_AFTER_S = 3.0

@@ -7,7 +7,7 @@ from typing import Any
 
 from analysis.diagnosis.data.recorded_conditions import as_recorded, has_carried_weight
 from analysis.diagnosis.first_model.choose_structure import Choice, choose_structure
-from analysis.diagnosis.first_model.model_structures import KINDS, Kind, Number, StructureRefused
+from analysis.diagnosis.first_model.model_structures import KINDS, Kind, ParameterEstimate, StructureRefused
 from analysis.diagnosis.result.unit_doubt import constant_sentence
 from analysis.wording import typeset
 from equalizer.plant.mechanical_model import suggest_word
@@ -75,7 +75,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
 def first_model_lines(done: FirstModel) -> tuple[str, ...]:
     """Lines for the terminal: the chosen structure and why, the parameters, the residual."""
     choice, fit = done.choice, done.choice.fit
-    rows = [_row(number) for number in fit.numbers]
+    rows = [_row(number) for number in fit.parameters]
     errors = [
         f"Held-out error at {name}: {100 * error:.3g} % of the {fit.compared}"
         for name, error in zip(fit.channels, fit.held_out, strict=True)
@@ -97,7 +97,7 @@ def first_model_summary(done: FirstModel) -> dict[str, Any]:
         "numbers": [
             {"name": number.name, "unit": number.unit, "value": number.value,
              "ci95": None if number.half is None else [number.value - number.half, number.value + number.half]}
-            for number in fit.numbers
+            for number in fit.parameters
         ],
         "compared": fit.compared,
         "held_out": dict(zip(fit.channels, fit.held_out, strict=True)),
@@ -107,7 +107,7 @@ def first_model_summary(done: FirstModel) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _row(number: Number) -> str:
+def _row(number: ParameterEstimate) -> str:
     value = typeset(f"{number.value:.4g}")
     if number.half is None:
         return f"  {number.name}: {value} {number.unit}"

@@ -43,19 +43,19 @@ def twin_summary(written: WrittenTwin) -> dict[str, Any]:
 
 
 def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
-    """Lines for the terminal."""
+    """Lines for the terminal: the rigid body, its modes, and the error of each channel."""
     model, fit, tolerance = written.model, written.fit, written.model.tolerance
     piece, mass_open = written.piece, _range(tolerance, "mass_kg")
     lines = [
         f"As one rigid body, up to {piece.up_to_hz:.3g} Hz: mass {_values(piece.mass)} kg{mass_open}, "
-        f"damping {_values(piece.damping)} N s/m, {_values(piece.of_friction)} N s/m of it friction's and taken off"
+        f"damping {_values(piece.damping)} N s/m, {_values(piece.of_friction)} N s/m of it from friction and subtracted"
         f"{_range(tolerance, 'damping_n_s_per_m')}",
     ]
     if modes := _modes_hz(written):
         swing = ", ".join(f"{each:.3g}" for each in modes)
         lines.append(f"{model.coordinates} coordinates; modes of the bodies on the driven axes: {swing} Hz")
     for error in fit.errors:
-        held = "" if error.held_out is None else f", {error.held_out:.1%} on what was kept for a test"
+        held = "" if error.held_out is None else f", {error.held_out:.1%} on held-out samples"
         noise = "" if error.noise is None else f" (noise {error.noise:.1%})"
         lines.append(
             f"{error.channel}: error {error.fit:.1%}{held}{noise}, {fit.band_hz[0]:g} to {fit.band_hz[1]:g} Hz"
@@ -64,15 +64,19 @@ def twin_lines(written: WrittenTwin) -> tuple[str, ...]:
 
 
 def _modes_hz(written: WrittenTwin) -> list[float]:
+    """Natural frequencies (Hz), ascending, of the bodies behind the driven axes with these held still:
+    sqrt(k / m) / 2 pi of each, exact where no two bodies are joined to each other."""
     model, m = written.model, written.model.inputs
     ratio = np.diag(model.stiffness)[m:] / np.diag(model.mass)[m:]
     return sorted(float(each) for each in np.sqrt(np.maximum(ratio, 0.0)) / (2 * np.pi))
 
 
 def _values(values: FloatArray) -> str:
+    """Three digits each, separated by commas."""
     return ", ".join(typeset(f"{value:.3g}") for value in values)
 
 
 def _range(tolerance: Tolerance | None, name: str) -> str:
+    """The standard deviation of a parameter in brackets; empty where it is not known."""
     value = None if tolerance is None else getattr(tolerance, name)
     return "" if value is None else f" (± {value:.2g})"

@@ -14,7 +14,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFitRefused,
     MechanicalFitSettings,
 )
-from equalizer.identification.mechanical.mechanical_level import RigidBody, fit_rigid_body, remove_friction_damping
+from equalizer.identification.mechanical.rigid_body import RigidBody, fit_rigid_body, remove_friction_damping
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
@@ -32,6 +32,7 @@ from study.workflows.recording.record_device import RecordingPlan, record_device
 
 TITLE = "The model was not made"
 STANDARD_GRAVITY = 9.80665
+"""m/s², exact by definition."""
 SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)
 """ADXL335 by its data sheet, with the capacitors of its board."""
 ACTUATOR = ActuatorLimits(bandwidth_hz=600.0)

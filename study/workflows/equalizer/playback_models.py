@@ -23,7 +23,9 @@ from study.store.disk.provenance import sha256_of
 from study.store.formats.identified_model_file import read_identified_model
 
 SAME_PLACE_M = 0.001
+"""Largest distance of two places (m) that count as one: files of one place may differ by rounding."""
 GAIN_LINES = 100
+"""Frequencies of the band, in a geometric series, at which the largest gain is looked for."""
 HIGHEST_GAIN = 1e6
 """Largest plausible gain (m/s^2 per N): no handle weighs a milligram."""
 FAR_M = 0.005

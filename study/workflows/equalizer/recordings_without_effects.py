@@ -8,7 +8,7 @@ import numpy as np
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.tracking.compensation.effect_roles import reason_not_compensated
-from equalizer.tracking.compensation.without_effects import subtract_effects
+from equalizer.tracking.compensation.subtract_effects import subtract_effects
 from study.errors import StudyError
 
 LEFT_OUT = 0.005

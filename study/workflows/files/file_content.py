@@ -29,6 +29,7 @@ class FileContent:
 
     @property
     def json_format(self) -> str | None:
+        """The `format` entry of a JSON object; None for other files."""
         name = self.json.get("format") if isinstance(self.json, dict) else None
         return name if isinstance(name, str) else None
 
@@ -58,6 +59,7 @@ def open_content(path: Path) -> FileContent:
 
 
 def _json(text: str) -> Any:
+    """The document; None where it is too long for one, or not JSON."""
     try:
         return load_json(text) if len(text) <= DOCUMENT_BYTES else None
     except ValueError:
@@ -65,6 +67,7 @@ def _json(text: str) -> Any:
 
 
 def _toml(text: str) -> dict[str, Any] | None:
+    """The document; None where it is not TOML, or so long that parsing it would take minutes."""
     if len(text) > TOML_BYTES or too_long_key(text):
         return None
     try:

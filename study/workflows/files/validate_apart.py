@@ -9,24 +9,25 @@ from pathlib import Path
 from study.errors import StudyError
 from study.workflows.files.validate import Validation, validate_file
 
-PATIENCE_S = 60.0
+FILE_TIMEOUT_S = 60.0
 """Longest wait for one file; a recording of an hour takes seconds."""
-START_S = 300.0
+START_TIMEOUT_S = 300.0
 """Longest wait for the imports of the worker; a swapping machine takes a minute."""
 
 
-def validate_files(paths: Sequence[Path], patience_s: float = PATIENCE_S) -> Iterator[Validation]:
-    """Validation of each file, in order. One worker serves all and is replaced when a file crashes it."""
+def validate_files(paths: Sequence[Path], timeout_s: float = FILE_TIMEOUT_S) -> Iterator[Validation]:
+    """Validation of each file, in order. timeout_s: longest wait for one file. One worker serves all files and is
+    replaced when a file crashes it or makes it hang. Raises StudyError where no worker starts."""
     worker = _start_worker()
     try:
         for path in paths:
             try:
-                yield worker.submit(_validate_safely, path).result(timeout=patience_s)
+                yield worker.submit(_validate_safely, path).result(timeout=timeout_s)
             except BrokenProcessPool:
                 yield _damage_report(path, "reading it crashes the HDF5 library")
                 worker = _start_worker()
             except TimeoutError:
-                yield _damage_report(path, f"reading it does not end within {patience_s:g} s")
+                yield _damage_report(path, f"reading it does not end within {timeout_s:g} s")
                 _kill(worker)
                 worker = _start_worker()
     finally:
@@ -34,19 +35,19 @@ def validate_files(paths: Sequence[Path], patience_s: float = PATIENCE_S) -> Ite
 
 
 def _validate_safely(path: Path) -> Validation:
-    """Runs in the worker; an exception of ours is not reported as a damaged file."""
+    """Runs in the worker; an error in hapteq itself is reported as one, not as a damaged file."""
     try:
         return validate_file(path)
-    except Exception as error:  # noqa: BLE001 - a file must not be called damaged for a mistake of ours
+    except Exception as error:  # noqa: BLE001 - a file must not be called damaged for an error in hapteq
         return Validation(path, "unknown", (f"hapteq failed on this file ({type(error).__name__}: {error}).",))
 
 
 def _start_worker() -> ProcessPoolExecutor:
     # Spawned: a forked child would inherit HDF5's locks.
     worker = ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
-    # How long it takes to start is the machine's affair, and no fault of a file.
+    # Started before the first file, so that a slow start is not counted against that file's time.
     try:
-        worker.submit(_ready).result(timeout=START_S)
+        worker.submit(_ready).result(timeout=START_TIMEOUT_S)
     except (BrokenProcessPool, TimeoutError) as trouble:
         _kill(worker)
         raise StudyError(

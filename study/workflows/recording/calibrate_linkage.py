@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 TITLE = "The linkage was not calibrated"
 SAVED = "Nothing moved and nothing was written."
 LARGEST_M = 0.2
+"""Largest radius and depth of the grid (m). By hand."""
 SHOWN = 3
 """Number of problems that an error lists; the others are counted."""
 

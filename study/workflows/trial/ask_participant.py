@@ -1,4 +1,5 @@
-"""Play one stimulus and get its answer: held until the answer or, in a detection trial, in one of two intervals."""
+"""Play one stimulus and get its answer: held until the answer or, in a detection trial, in one of two intervals
+(two-interval forced choice, 2IFC)."""
 
 from dataclasses import dataclass
 
@@ -21,7 +22,7 @@ class StimulusReply:
     started_s: float
     """Time at which answering became possible."""
     felt_whole: bool
-    """The stimulus was faultless until the answer. Later faults, such as during a slow disk write, do not void the
+    """Whether the device had no fault until the answer. Later faults, such as during a slow disk write, do not void the
     answer."""
     played: Played | None
     """Result of a stimulus that ended before the question; None if it is still held or never began."""
@@ -39,9 +40,8 @@ def ask_participant(state: SessionState, present: Present, question: Question, s
     if present.phase is Phase.DETECTION:
         return _in_one_of_two_intervals(state, present, question, sitting)
     sitting.device.hold(_stimulus(state, present, sitting))
-    started_s = (
-        sitting.clock.now_s()
-    )  # Taken before the pulse: a lost pulse takes time, which must not shorten the response time.
+    # Taken before the pulse: a lost pulse takes time, which must not shorten the response time.
+    started_s = sitting.clock.now_s()
     pulse = sitting.pulse()
     sitting.hand.feel(present, state.answers)
     reply = _reply_to(question, sitting)
@@ -54,6 +54,7 @@ def ask_participant(state: SessionState, present: Present, question: Question, s
 def _in_one_of_two_intervals(
     state: SessionState, present: Present, question: Question, sitting: Sitting
 ) -> StimulusReply:
+    """Play the stimulus in interval 1 or 2 (`present.label`), nothing in the other, then ask in which it was."""
     played: Played | None = None
     pulse: Pulse | None = None
     sitting.hand.feel(present, state.answers)

@@ -15,6 +15,7 @@ from study.session.state.state import SessionState
 from study.workflows.trial.sitting import Sitting, Sound, record
 
 SAMPLE_RATE_HZ = 44_100
+"""Sample rate of the noise: one that every sound card plays."""
 LOOP_S = 60
 """Length of the loop: longer than a person remembers noise."""
 

@@ -19,6 +19,7 @@ from study.workflows.views.lsl_outlets import not_followed_error
 EVERY_S = 0.02
 """Between two looks at the log: a marker comes so late, its time stamp does not."""
 OFFSET_EVERY_S = 10.0
+"""Interval at which the offset of the two clocks is measured (s)."""
 OFFSET_TRIES = 10
 """The closest pair of readings counts: any other was interrupted in between."""
 NOTED_S = 0.001

@@ -8,7 +8,7 @@ import pytest
 from analysis.figures.psychometric import draw_people_curves, draw_person_curves
 from analysis.figures.study_pictures import study_pictures
 from analysis.figures.style import PAGE_IN
-from analysis.figures.units import draw_units
+from analysis.figures.thresholds_by_unit import draw_thresholds_by_unit
 from analysis.psychophysics.detection import above_detection
 from analysis.psychophysics.hierarchy.answers import count_answers
 from analysis.psychophysics.hierarchy.observed_shares import shares_of_people, shares_of_person
@@ -71,7 +71,7 @@ def test_units_stand_side_by_side_with_cuts_and_medians(analysis):
         threshold_table(analysis.thresholds, analysis.table.frequencies_hz, q)
         for q in ("threshold_n", "threshold_mps2")
     ]
-    force, acceleration = draw_units(tables).axes
+    force, acceleration = draw_thresholds_by_unit(tables).axes
     assert (force.get_ylabel(), acceleration.get_ylabel()) == ("Commanded (N)", "Delivered (m/s²)")
     cut = [text for text in force.texts if text.arrow_patch is not None]
     assert len(cut) == analysis.table.cut > 0
@@ -87,7 +87,7 @@ def test_thresholds_of_zero_are_left_out_of_a_ratio_scale(analysis):
     """An accelerometer that says the same all the time delivers nothing, as it says."""
     table = threshold_table(analysis.thresholds, analysis.table.frequencies_hz, "threshold_mps2")
     some = replace(table, values=tuple((0.0, *row[1:]) for row in table.values))
-    assert draw_units([analysis.table, some]).axes[1].get_ylim()[0] > 0
+    assert draw_thresholds_by_unit([analysis.table, some]).axes[1].get_ylim()[0] > 0
     still = tuple(replace(row, threshold_mps2=0.0, threshold_mm=0.0) for row in analysis.thresholds)
     assert "units" not in [picture.name for picture in study_pictures(replace(analysis, thresholds=still))]
 

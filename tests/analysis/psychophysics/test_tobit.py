@@ -17,10 +17,10 @@ def people(seed: int, n: int = 10, means=(-6.0, 6.0, 8.0), person: float = 2.0, 
 def test_without_a_cut_it_is_the_balanced_model_of_the_textbook():
     values = people(1)
     fit = fit_tobit(values, np.zeros_like(values, dtype=bool))
-    np.testing.assert_allclose(fit.numbers[:3], values.mean(axis=0), atol=1e-3)
+    np.testing.assert_allclose(fit.parameters[:3], values.mean(axis=0), atol=1e-3)
     centred = values - values.mean(axis=0) - values.mean(axis=1, keepdims=True) + values.mean()
     error = (centred**2).sum() / (10 * 2)  # maximum likelihood: over n (k - 1)
-    assert np.exp(2 * fit.numbers[4]) == pytest.approx(error, rel=1e-3)
+    assert np.exp(2 * fit.parameters[4]) == pytest.approx(error, rel=1e-3)
     variance = fit.covariance[0, 0] + fit.covariance[1, 1] - 2 * fit.covariance[0, 1]
     assert variance == pytest.approx(2 * error / 10, rel=1e-3)
 
@@ -31,8 +31,8 @@ def test_with_a_single_frequency_it_is_scipys_fit_of_censored_values():
     values = np.minimum(values, 1.0)
     mean, sd = norm.fit(CensoredData(uncensored=values[~cut], right=values[cut]))
     fit = fit_tobit(values, cut)
-    assert fit.numbers[0] == pytest.approx(mean, abs=5e-3)
-    assert np.exp(2 * fit.numbers[1]) + np.exp(2 * fit.numbers[2]) == pytest.approx(sd**2, rel=5e-3)
+    assert fit.parameters[0] == pytest.approx(mean, abs=5e-3)
+    assert np.exp(2 * fit.parameters[1]) + np.exp(2 * fit.parameters[2]) == pytest.approx(sd**2, rel=5e-3)
 
 
 def test_differences_that_the_cap_cut_are_recovered_where_cuts_are_clean():

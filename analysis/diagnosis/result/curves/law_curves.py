@@ -18,6 +18,8 @@ from equalizer.signals.unit_system import UnitSystem
 
 _BEYOND = 0.25
 """Share of the visited range by which a formula is drawn beyond it, on either side."""
+_MAIN_SHARE = 0.5
+"""Correlation ratio of a law's force with one variable from which the curve is drawn against it alone. By hand."""
 _LINE_POINTS = 400
 """Points of a drawn law."""
 
@@ -51,7 +53,7 @@ def law_signature(
     shares = {name: correlation_ratio(variables[name].values[used], force[used]) for name in law.variables}
     main = variables[max(shares, key=lambda name: shares[name])]
     along, visited = main.name, None
-    if max(shares.values()) < 0.5:  # only the variables together explain most of it
+    if max(shares.values()) < _MAIN_SHARE:  # only the variables together explain most of it
         main = _Variable(f"force of the law ({system.force})", force)
         along, law_at, values = main.name, *_identity(force[used])
     elif len(law.variables) == 1 and not has_memory(law):
@@ -98,5 +100,6 @@ def _evaluate_beyond(law: Law, seen: FloatArray, rate_hz: float) -> tuple[FloatA
 
 
 def _identity(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The straight line of a law drawn against its own force."""
     ends = np.array([values.min(), values.max()])
     return ends, ends

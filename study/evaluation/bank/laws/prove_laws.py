@@ -21,7 +21,7 @@ LAWS = "laws"
 
 
 @dataclass(frozen=True, slots=True)
-class LawProof:
+class LawBlindTest:
     """Result of a bank of concealed laws, with its score."""
 
     folder: ProofFolder
@@ -33,7 +33,7 @@ class LawProof:
     engines: tuple[str, ...]
 
 
-def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawProof:
+def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawBlindTest:
     """Run or continue a bank of laws in the folder `path`. Resumable. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief, LAWS)
     with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
@@ -42,7 +42,7 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
         there = [name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()]
         answer_bank(folder, names, there, options, on_progress)
     outcomes = reveal_laws(folder, plan.cases)
-    return LawProof(folder, plan, seal, outcomes, law_score(outcomes), engines(folder, names))
+    return LawBlindTest(folder, plan, seal, outcomes, law_score(outcomes), engines(folder, names))
 
 
 def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:

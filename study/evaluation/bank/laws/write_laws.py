@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from analysis.evaluation.blind_test.wording import figure_text
 from analysis.evaluation.laws.law_outcome import LawOutcome
-from analysis.evaluation.proof.wording import figure_text
 from equalizer.laws.law import Law
-from study.evaluation.bank.laws.prove_laws import LawProof
+from study.evaluation.bank.laws.prove_laws import LawBlindTest
 from study.evaluation.bank.write_proof import FigureRow, commit
 from study.store.disk.csv_rows import rows_to_csv
 from study.store.disk.json_document import write_json
@@ -46,7 +46,7 @@ class LawRow:
     miss: bool
 
 
-def write_laws(proof: LawProof) -> None:
+def write_laws(proof: LawBlindTest) -> None:
     """Write document and table, replacing earlier ones. Raises StudyError."""
     document = {
         **_facts(proof),
@@ -58,7 +58,7 @@ def write_laws(proof: LawProof) -> None:
     write_text(proof.folder.path / TABLE, rows_to_csv(rows, LawRow), overwrite=True)
 
 
-def write_law_table(path: Path, proof: LawProof) -> None:
+def write_law_table(path: Path, proof: LawBlindTest) -> None:
     """Write figures and misses as a small table that can be kept beside the code. Raises StudyError."""
     figures = [FigureRow(each.name, each.value, each.low, each.high, each.of) for each in proof.score.figures]
     lines = [
@@ -71,7 +71,7 @@ def write_law_table(path: Path, proof: LawProof) -> None:
     write_text(path.with_name(f"{path.stem}-misses{path.suffix}"), rows_to_csv(misses, LawRow), overwrite=True)
 
 
-def law_lines(proof: LawProof) -> Iterator[str]:
+def law_lines(proof: LawBlindTest) -> Iterator[str]:
     """Result as terminal lines, misses first."""
     yield f"{len(proof.score.misses)} misses in {len(proof.outcomes)} cases"
     for miss in proof.score.misses:
@@ -86,12 +86,12 @@ def law_lines(proof: LawProof) -> Iterator[str]:
     yield f"Everything is in {proof.folder.path}"
 
 
-def law_summary(proof: LawProof) -> str:
+def law_summary(proof: LawBlindTest) -> str:
     """Result as JSON text."""
     return json.dumps({"folder": str(proof.folder.path), **_facts(proof)}, indent=2)
 
 
-def _facts(proof: LawProof) -> dict[str, Any]:
+def _facts(proof: LawBlindTest) -> dict[str, Any]:
     return {
         "of": "laws",
         "seed": proof.plan.seed,

@@ -6,6 +6,10 @@ whether this holds for the whole handle or only for this axis's motion. An extra
 the handle; its direction deviates from the named axis by up to 0.25 towards each other axis. Backlash lies between the
 motor (a part of the axis's mass, on which the force acts) and the handle; in contact a stiff spring with little damping
 joins them.
+
+Ranges are set by hand for a device of the omega.3's size, from a weak effect to a strong one; strengths 0 and 1 are
+their ends (`EffectContext.log_between`). Units: damping N s/m, mass kg, quadratic damping N s²/m², gap m, frequency Hz,
+inertia 1/m over the handle's travel.
 """
 
 from dataclasses import replace

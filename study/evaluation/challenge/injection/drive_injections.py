@@ -9,7 +9,13 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.injection.axis_motion import AxisMotion
 
-Numbers = Mapping[str, float]
+Values = Mapping[str, float]
+"""Parameters of a fault by name, in the units of the recording."""
+NEWTON_STEPS = 60
+"""Newton steps to the command that a cubic gain turns into the recorded one: far more than convergence takes."""
+HIGH_QUANTILE = 0.98
+"""Quantile of the command's size, or of its steps, at which a saturation or a slew limit is put: rarely reached, yet
+reached. By hand, as are all ranges below."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +26,7 @@ class ForceInjection:
     """Name in the vocabulary, or a new name in its style."""
     draw: Callable[[AxisMotion, float, np.random.Generator], dict[str, float]]
     """Parameters from the strength, 0 (weakest) to 1."""
-    command: Callable[[AxisMotion, Numbers], FloatArray]
+    command: Callable[[AxisMotion, Values], FloatArray]
     """(n,): the command that would have been needed with the fault."""
     actuator: bool = False
     """A fault of the drive: it does not exist where the motion is imposed."""
@@ -41,39 +47,40 @@ def level_of(motion: AxisMotion, strength: float) -> float:
 
 
 def _shift_later(samples: FloatArray, by: float) -> FloatArray:
+    """Samples `by` samples later (negative: earlier), interpolated linearly."""
     at = np.arange(len(samples), dtype=np.float64)
     return np.asarray(np.interp(at - by, at, samples))
 
 
-def _undo_cubic_gain(motion: AxisMotion, numbers: Numbers) -> FloatArray:
+def _undo_cubic_gain(motion: AxisMotion, values: Values) -> FloatArray:
     """Command u' with u' + cubic u'^3 = u (Newton iteration)."""
     found = motion.command.copy()
-    for _ in range(60):
-        found -= (found + numbers["cubic"] * found**3 - motion.command) / (1 + 3 * numbers["cubic"] * found**2)
+    for _ in range(NEWTON_STEPS):
+        found -= (found + values["cubic"] * found**3 - motion.command) / (1 + 3 * values["cubic"] * found**2)
     return found
 
 
 def _draw_limit(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
-    limit = float(np.quantile(np.abs(motion.command), 0.98))
+    limit = float(np.quantile(np.abs(motion.command), HIGH_QUANTILE))
     return {"limit": limit, "more": float(0.05 * 20.0**strength)}
 
 
-def _undo_saturation(motion: AxisMotion, numbers: Numbers) -> FloatArray:
+def _undo_saturation(motion: AxisMotion, values: Values) -> FloatArray:
     """A larger command wherever the force was at its limit."""
-    over = np.abs(motion.command) >= 0.97 * numbers["limit"]
-    return np.asarray(np.where(over, motion.command * (1 + numbers["more"]), motion.command))
+    over = np.abs(motion.command) >= 0.97 * values["limit"]
+    return np.asarray(np.where(over, motion.command * (1 + values["more"]), motion.command))
 
 
 def _draw_rate(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     steps = np.abs(np.diff(motion.command))
-    top = float(np.quantile(steps[steps > 0], 0.98)) if steps.any() else 0.0
+    top = float(np.quantile(steps[steps > 0], HIGH_QUANTILE)) if steps.any() else 0.0
     return {"rate": top * motion.rate_hz, "from": 1.0 - 0.05 * 14.0**strength}
 
 
-def _undo_slew_limit(motion: AxisMotion, numbers: Numbers) -> FloatArray:
+def _undo_slew_limit(motion: AxisMotion, values: Values) -> FloatArray:
     """A command that arrives at once wherever the force changed at about its highest rate."""
     steps = np.diff(motion.command)
-    fast = np.abs(steps) * motion.rate_hz >= numbers["from"] * numbers["rate"]
+    fast = np.abs(steps) * motion.rate_hz >= values["from"] * values["rate"]
     goes_on = fast[1:] & fast[:-1] & (steps[1:] * steps[:-1] > 0)
     found = motion.command.copy()
     for k in np.flatnonzero(goes_on)[::-1]:
@@ -93,26 +100,24 @@ def _middle_turn(samples: FloatArray, rate_hz: float) -> float:
 
 
 DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
-    ForceInjection("force_gain", _gain, lambda motion, numbers: motion.command / numbers["gain"], actuator=True),
+    ForceInjection("force_gain", _gain, lambda motion, values: motion.command / values["gain"], actuator=True),
     ForceInjection(
         "force_offset",
         lambda motion, s, r: {"offset": float(r.choice((-1.0, 1.0))) * level_of(motion, s)},
-        lambda motion, numbers: motion.command - numbers["offset"],
+        lambda motion, values: motion.command - values["offset"],
         actuator=True,
     ),
     ForceInjection(
         "transport_delay",
         lambda motion, s, r: {"delay": max(0.3 * 0.02 * 50.0**s / _middle_turn(motion.command, motion.rate_hz), 1e-9)},
-        lambda motion, numbers: _shift_later(motion.command, -numbers["delay"] * motion.rate_hz),
+        lambda motion, values: _shift_later(motion.command, -values["delay"] * motion.rate_hz),
         actuator=True,
         memory=True,
     ),
     ForceInjection(
         "amplifier_lag",
         lambda motion, s, r: {"time_constant": 0.3 * 0.02 * 50.0**s / _middle_turn(motion.command, motion.rate_hz)},
-        lambda motion, numbers: (
-            motion.command + numbers["time_constant"] * np.gradient(motion.command) * motion.rate_hz
-        ),
+        lambda motion, values: motion.command + values["time_constant"] * np.gradient(motion.command) * motion.rate_hz,
         actuator=True,
         memory=True,
     ),
@@ -121,13 +126,13 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ForceInjection(
         "force_quantization",
         lambda motion, s, r: {"step": level_of(motion, 0.3 + 0.7 * s)},
-        lambda motion, numbers: numbers["step"] * np.round(motion.command / numbers["step"]),
+        lambda motion, values: values["step"] * np.round(motion.command / values["step"]),
         actuator=True,
     ),
     ForceInjection(
         "force_deadband",
         lambda motion, s, r: {"width": 0.5 * level_of(motion, s)},
-        lambda motion, numbers: motion.command + numbers["width"] * np.sign(motion.command),
+        lambda motion, values: motion.command + values["width"] * np.sign(motion.command),
         actuator=True,
     ),
     ForceInjection(
@@ -139,7 +144,7 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ForceInjection(
         "force_gain_drift",
         lambda motion, s, r: {"change": float(r.choice((-0.5, 1.0))) * 0.05 * 20.0**s},
-        lambda motion, numbers: motion.command / (1 + numbers["change"] * motion.share_of_time),
+        lambda motion, values: motion.command / (1 + values["change"] * motion.share_of_time),
         actuator=True,
     ),
 )

@@ -16,7 +16,7 @@ from study.evaluation.challenge.injection.axis_motion import AxisMotion
 from study.evaluation.challenge.injection.drive_injections import (
     DRIVE_INJECTIONS,
     ForceInjection,
-    Numbers,
+    Values,
     level_of,
     rms,
 )
@@ -31,7 +31,7 @@ def _scaled_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> Force
     def draw(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
         return {"size": level_of(motion, strength) / max(rms(shape(motion)), 1e-300)}
 
-    return ForceInjection(name, draw, lambda motion, numbers: motion.command + numbers["size"] * shape(motion))
+    return ForceInjection(name, draw, lambda motion, values: motion.command + values["size"] * shape(motion))
 
 
 def _sign(motion: AxisMotion) -> FloatArray:
@@ -47,8 +47,8 @@ def _draw_cogging(motion: AxisMotion, strength: float, random: np.random.Generat
     return {"amplitude": 1.4 * level_of(motion, strength), "pitch": pitch, "turn": float(random.random())}
 
 
-def _add_cogging(motion: AxisMotion, numbers: Numbers) -> FloatArray:
-    return motion.command + numbers["amplitude"] * np.sin(2 * np.pi * (motion.q / numbers["pitch"] + numbers["turn"]))
+def _add_cogging(motion: AxisMotion, values: Values) -> FloatArray:
+    return motion.command + values["amplitude"] * np.sin(2 * np.pi * (motion.q / values["pitch"] + values["turn"]))
 
 
 def _travel_beyond(motion: AxisMotion, position: float) -> FloatArray:
@@ -67,9 +67,9 @@ def _draw_asymmetric(motion: AxisMotion, strength: float, random: np.random.Gene
     return {"level_positive": level * (1 + share), "level_negative": level * (1 - share)}
 
 
-def _add_asymmetric_friction(motion: AxisMotion, numbers: Numbers) -> FloatArray:
+def _add_asymmetric_friction(motion: AxisMotion, values: Values) -> FloatArray:
     sign = _sign(motion)
-    return motion.command + np.where(sign > 0, numbers["level_positive"], numbers["level_negative"]) * sign
+    return motion.command + np.where(sign > 0, values["level_positive"], values["level_negative"]) * sign
 
 
 def _draw_bristles(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
@@ -78,11 +78,11 @@ def _draw_bristles(motion: AxisMotion, strength: float, random: np.random.Genera
     return {"level": level, "stiffness": level / give}
 
 
-def _add_bristles(motion: AxisMotion, numbers: Numbers) -> FloatArray:
+def _add_bristles(motion: AxisMotion, values: Values) -> FloatArray:
     """Elastoplastic friction: a spring that slides at the level."""
     force, found = 0.0, np.empty(len(motion.q))
     for k, way in enumerate(np.diff(motion.q, prepend=motion.q[0])):
-        force = min(max(force + numbers["stiffness"] * way, -numbers["level"]), numbers["level"])
+        force = min(max(force + values["stiffness"] * way, -values["level"]), values["level"])
         found[k] = force
     return motion.command + found
 
@@ -100,7 +100,7 @@ FORCE_INJECTIONS: tuple[ForceInjection, ...] = (
     ForceInjection(
         "end_stop",
         _draw_stop,
-        lambda motion, numbers: motion.command + numbers["stiffness"] * _travel_beyond(motion, numbers["position"]),
+        lambda motion, values: motion.command + values["stiffness"] * _travel_beyond(motion, values["position"]),
     ),
     *DRIVE_INJECTIONS,
 )

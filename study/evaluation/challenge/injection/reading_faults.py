@@ -10,95 +10,91 @@ from scipy.spatial.transform import Rotation
 from equalizer.signals.signal import FloatArray
 
 
-def lag(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def lag(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """First-order low-pass with the given bandwidth (Hz)."""
-    share = 1.0 - np.exp(-2 * np.pi * numbers["bandwidth"] / rate_hz)
+    share = 1.0 - np.exp(-2 * np.pi * values["bandwidth"] / rate_hz)
     filtered, _ = lfilter([share], [1.0, share - 1.0], samples, axis=0, zi=(1.0 - share) * samples[:1])
     return np.asarray(filtered)
 
 
-def clip(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def clip(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Clipping at +-limit."""
-    return np.asarray(np.clip(samples, -numbers["limit"], numbers["limit"]))
+    return np.asarray(np.clip(samples, -values["limit"], values["limit"]))
 
 
-def hum(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def hum(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Mains hum, the same in all channels."""
-    turns = numbers["frequency"] * np.arange(len(samples)) / rate_hz + numbers["turn"]
-    return np.asarray(samples + numbers["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
+    turns = values["frequency"] * np.arange(len(samples)) / rate_hz + values["turn"]
+    return np.asarray(samples + values["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
 
 
-def drift(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def drift(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Linear drift to `total` at the end."""
-    return samples + numbers["total"] * np.linspace(0.0, 1.0, len(samples))[:, None]
+    return samples + values["total"] * np.linspace(0.0, 1.0, len(samples))[:, None]
 
 
-def offset(
-    samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def offset(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Constant offset."""
-    return samples + numbers["offset"]
+    return samples + values["offset"]
 
 
-def steps(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def steps(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Quantization to multiples of `step`."""
-    return np.asarray(numbers["step"] * np.round(samples / numbers["step"]))
+    return np.asarray(values["step"] * np.round(samples / values["step"]))
 
 
-def lose(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def lose(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Each sample is lost with probability `fraction` and repeats the one before."""
-    lost = random.random(len(samples)) < numbers["fraction"]
+    lost = random.random(len(samples)) < values["fraction"]
     lost[0] = False
     kept = np.maximum.accumulate(np.where(lost, 0, np.arange(len(samples))))
     return np.asarray(samples[kept])
 
 
 def other_clock(
-    samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
     """Readings taken at t (1 + ppm 1e-6), interpolated linearly."""
     at = np.arange(len(samples), dtype=np.float64)
-    read = at * (1.0 + 1e-6 * numbers["ppm"])
+    read = at * (1.0 + 1e-6 * values["ppm"])
     return np.column_stack([np.interp(read, at, channel) for channel in samples.T])
 
 
-def turn(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def turn(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Rotation of the three channels by `degrees` about an axis."""
-    about = np.array([numbers["about_x"], numbers["about_y"], numbers["about_z"]])
-    return np.asarray(Rotation.from_rotvec(np.radians(numbers["degrees"]) * about).apply(np.array(samples)))
+    about = np.array([values["about_x"], values["about_y"], values["about_z"]])
+    return np.asarray(Rotation.from_rotvec(np.radians(values["degrees"]) * about).apply(np.array(samples)))
 
 
-def scale(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def scale(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Gain factor."""
-    return numbers["gain"] * samples
+    return values["gain"] * samples
 
 
-def late(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def late(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Readings delayed by `offset` (s), interpolated linearly."""
     at = np.arange(len(samples), dtype=np.float64)
-    return np.column_stack([np.interp(at - numbers["offset"] * rate_hz, at, channel) for channel in samples.T])
+    return np.column_stack([np.interp(at - values["offset"] * rate_hz, at, channel) for channel in samples.T])
 
 
-def cubic(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def cubic(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Cubic nonlinearity a + cubic a^3."""
-    return np.asarray(samples + numbers["cubic"] * samples**3)
+    return np.asarray(samples + values["cubic"] * samples**3)
 
 
-def square(
-    samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator
-) -> FloatArray:
+def square(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Quadratic nonlinearity a + square a^2."""
-    return np.asarray(samples + numbers["square"] * samples**2)
+    return np.asarray(samples + values["square"] * samples**2)
 
 
-def noise(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def noise(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Added white noise with the given rms."""
-    return np.asarray(samples + numbers["rms"] * random.normal(size=samples.shape))
+    return np.asarray(samples + values["rms"] * random.normal(size=samples.shape))
 
 
-def play(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def play(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """Hysteresis: the sensor is driven through a gap."""
-    found, read, half = np.empty_like(samples), samples[0], 0.5 * numbers["gap"]
+    found, read, half = np.empty_like(samples), samples[0], 0.5 * values["gap"]
     for k, here in enumerate(samples):
         known = np.isfinite(here)
         read = np.where(known, np.where(np.isfinite(read), np.clip(read, here - half, here + half), here), read)
@@ -106,8 +102,8 @@ def play(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], rand
     return found
 
 
-def cross(samples: FloatArray, rate_hz: float, numbers: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def cross(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
     """The first channel also reads the second."""
     found = samples.copy()
-    found[:, 0] += numbers["from_next"] * samples[:, 1] * np.nanstd(samples[:, 0]) / np.nanstd(samples[:, 1])
+    found[:, 0] += values["from_next"] * samples[:, 1] * np.nanstd(samples[:, 0]) / np.nanstd(samples[:, 1])
     return np.asarray(found)

@@ -78,7 +78,7 @@ def test_an_exponent_that_was_rounded_counts_as_a_number(hardened):
     cube, drag = claim("hardening_stiffness", k3=CUBIC), claim("quadratic_damping", coefficient=0.1)
     two = named(hardened, cube, drag)
     found = discover(context, two, quiet, always, 1)
-    assert len(found.found.after.fitted.hypothesis.numbers) < len(two.after.fitted.hypothesis.numbers) == 2
+    assert len(found.found.after.fitted.hypothesis.parameters) < len(two.after.fitted.hypothesis.parameters) == 2
     assert not does_as_well_with_less(context, found, two.after)
 
 

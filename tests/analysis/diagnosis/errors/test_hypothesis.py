@@ -44,7 +44,7 @@ def test_every_axis_has_numbers_of_its_own_where_each_is_claimed():
     drag = EFFECTS["viscous_damping"]
     each = hypothesis_of_claim(Claim(drag, "each", (0, 1)), [{p.name: v for p in drag.parameters} for v in (0.5, 0.25)])
     assert [item.sites for item in each.placed_effects()] == [(0,), (1,)]
-    assert len(each.numbers) == 2 * sum(not p.fixed for p in drag.parameters)
+    assert len(each.parameters) == 2 * sum(not p.fixed for p in drag.parameters)
 
 
 def test_claims_are_put_together_and_taken_away_again():
@@ -91,7 +91,7 @@ def test_every_effect_is_suggested_at_every_axis_or_not_at_all(arena_of):
         (claim,) = each.claims
         assert set(claim.sites) <= {0, 1}
         assert claim.spread == "one" or claim.sites == (0, 1)
-        for number, at in zip(each.numbers, each.point, strict=True):
+        for number, at in zip(each.parameters, each.point, strict=True):
             low, high = number.bounds
             assert low - 1e-9 <= at <= high + 1e-9
 

@@ -91,7 +91,7 @@ def test_ninety_five_of_a_hundred_intervals_hold_the_truth(colour, strength):
     held = 0
     for seed in range(DRAWS):
         found, errors, _ = fitted_and_errors(seed, colour, strength)
-        of, at = found.hypothesis.numbers[0], found.hypothesis.point[0]
+        of, at = found.hypothesis.parameters[0], found.hypothesis.point[0]
         held += of.value(at - 1.96 * errors[1]) <= FORCE_N <= of.value(at + 1.96 * errors[1])
     assert 0.88 <= held / DRAWS <= 0.99
 
@@ -128,7 +128,7 @@ def of_segments(seed, varies, count=SEGMENTS):
     known = sensitivity(varied, TUNING, np.zeros(1), PUSHED)
     found = fit(varied, TUNING, evaluate_fit(varied, TUNING, np.zeros(1), PUSHED), known, 4)
     noise, between = (errors(varied, found, all_of(varied, found)) for errors in (standard_errors, segment_errors))
-    of, at = found.hypothesis.numbers[0], found.hypothesis.point[0]
+    of, at = found.hypothesis.parameters[0], found.hypothesis.point[0]
     return [
         of.value(at - 1.96 * error) <= FORCE_N <= of.value(at + 1.96 * error)
         for error in (noise[1], np.hypot(noise[1], between[1]))
@@ -193,7 +193,7 @@ def of_periods(seed, period=PERIOD, lacking=1.0):
     known = sensitivity(repeated, TUNING, np.zeros(1), PUSHED)
     found = fit(repeated, TUNING, evaluate_fit(repeated, TUNING, np.zeros(1), PUSHED), known, 4)
     error = standard_errors(repeated, found, all_of(repeated, found))[1]
-    of, at = found.hypothesis.numbers[0], found.hypothesis.point[0]
+    of, at = found.hypothesis.parameters[0], found.hypothesis.point[0]
     return of.value(at - 1.96 * error) <= FORCE_N <= of.value(at + 1.96 * error)
 
 
@@ -255,7 +255,7 @@ def test_two_numbers_that_act_alike_are_parted_by_the_calibration_alone(quality)
     (played,) = silent.residuals(MODEL, added.placed_effects())
     samples = np.random.default_rng(7).standard_normal((SAMPLES, 1)) - played
     alike = replace(silent, records=(replace(record, measured=samples),))
-    far = replace(added, point=np.array([added.numbers[0].coordinate(0.1)]))
+    far = replace(added, point=np.array([added.parameters[0].coordinate(0.1)]))
     begun = evaluate_fit(alike, TUNING, np.array([3.0]), far)
 
     def at(fitted):

@@ -1,4 +1,4 @@
-"""Noise of a known colour becomes white, and what it hid stands out."""
+"""Noise of a known spectrum becomes white, and what it hid stands out."""
 
 import numpy as np
 import pytest
@@ -15,10 +15,10 @@ def ringing(seed: int, samples: int = 8000) -> np.ndarray:
     return np.asarray(lfilter([1.0], [1.0, -1.9, 0.95], white, axis=0))
 
 
-def test_what_is_foreseen_from_the_past_is_taken_off():
-    left = whitening_filter([ringing(1)], LEAST).apply(ringing(2))
-    assert left.std() == pytest.approx(1.0, rel=0.05)
-    after = np.corrcoef(left[100:-1, 0], left[101:, 0])[0, 1]
+def test_the_part_predicted_from_the_past_is_subtracted():
+    whitened = whitening_filter([ringing(1)], LEAST).apply(ringing(2))
+    assert whitened.std() == pytest.approx(1.0, rel=0.05)
+    after = np.corrcoef(whitened[100:-1, 0], whitened[101:, 0])[0, 1]
     assert abs(after) < 0.1
 
 
@@ -28,26 +28,26 @@ def test_white_noise_stays_what_it_is():
 
 
 def test_whitening_raises_a_tone_that_the_noise_lacks():
-    colour = whitening_filter([ringing(1)], LEAST)
+    whitening = whitening_filter([ringing(1)], LEAST)
     tone = 2.0 * np.sin(2 * np.pi * 0.3 * np.arange(8000))[:, None]
     before = np.var(ringing(2) + tone) / np.var(ringing(2))
-    after = np.var(colour.apply(ringing(2) + tone)) / np.var(colour.apply(ringing(2)))
+    after = np.var(whitening.apply(ringing(2) + tone)) / np.var(whitening.apply(ringing(2)))
     assert before < 1.1
     assert after > 10
 
 
 def test_a_sample_depends_on_no_later_sample():
-    colour, course = whitening_filter([ringing(1)], LEAST), ringing(2)
-    changed = course.copy()
+    whitening, residual = whitening_filter([ringing(1)], LEAST), ringing(2)
+    changed = residual.copy()
     changed[5000:] += 7.0
-    assert np.allclose(colour.apply(changed)[:5000], colour.apply(course)[:5000])
+    assert np.allclose(whitening.apply(changed)[:5000], whitening.apply(residual)[:5000])
 
 
 def test_only_samples_after_enough_known_ones_count():
-    colour, course = whitening_filter([ringing(1)], LEAST), ringing(2)
-    course[:300] = np.nan
-    warm = colour.warm(course)
-    assert not warm[: 300 + colour.lags].any()
-    assert warm[300 + colour.lags :].all()
-    assert np.isnan(colour.apply(course)[:300]).all()
-    assert np.isfinite(colour.apply(course)[300:]).all()
+    whitening, residual = whitening_filter([ringing(1)], LEAST), ringing(2)
+    residual[:300] = np.nan
+    full = whitening.has_full_history(residual)
+    assert not full[: 300 + whitening.lags].any()
+    assert full[300 + whitening.lags :].all()
+    assert np.isnan(whitening.apply(residual)[:300]).all()
+    assert np.isfinite(whitening.apply(residual)[300:]).all()

@@ -131,7 +131,7 @@ def test_a_first_model_of_a_decay_has_damping_and_spring_per_unit_of_mass():
     read, _ = read_free_motion((recording(decay(linear, 1.0, 12, 1)),))
     choice = choose_structure(read, None, lambda share: None)
     assert choice.fit.kind == "mass-spring"
-    numbers = {number.name: number.value for number in choice.fit.numbers}
+    numbers = {number.name: number.value for number in choice.fit.parameters}
     assert numbers == {"damping angle": pytest.approx(DAMPING, rel=0.1), "stiffness angle": pytest.approx(SPRING, 0.01)}
     with pytest.raises(StructureRefused, match="has a mass"):
         choose_structure(read, "massless", lambda share: None)

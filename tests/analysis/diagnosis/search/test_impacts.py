@@ -72,10 +72,12 @@ def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
 
 def test_errors_stay_small_where_parameters_are_correlated():
     """Two columns with a correlation of 0.95, of whose information a third is chance."""
-    number = hypothesis_of_claim(Claim(PLAY, "one", (AXIS,)), [LOOSE[0].values]).numbers[0]
+    number = hypothesis_of_claim(Claim(PLAY, "one", (AXIS,)), [LOOSE[0].values]).parameters[0]
     power = 2 * _move(number) ** 2
     view = SimpleNamespace(spread=np.sqrt(power * 30.0), ensemble=1, weights=np.ones((1, 1, 1)))
-    at = SimpleNamespace(hypothesis=SimpleNamespace(numbers=(number, number)), predicted=np.zeros((1, 1, 1)), cost=1.0)
+    at = SimpleNamespace(
+        hypothesis=SimpleNamespace(parameters=(number, number)), predicted=np.zeros((1, 1, 1)), cost=1.0
+    )
     errors = _errors(view, at, np.array([[90.0, 85.5], [85.5, 90.0]]))
     # Without chance: 1 / sqrt(90 (1 - 0.95^2)) = 0.34; with two thirds of the information, sqrt(3 / 2) of that.
     assert errors == pytest.approx([0.34 * np.sqrt(1.5)] * 2, rel=0.01)

@@ -34,7 +34,7 @@ def drawn(fit):
     from numpyro.infer import MCMC, NUTS
 
     numpyro.enable_x64()
-    known = fit.numbers[:K], fit.numbers[LOG_SDS], fit.numbers[K + 2], expit(fit.numbers[K + 5])
+    known = fit.parameters[:K], fit.parameters[LOG_SDS], fit.parameters[K + 2], expit(fit.parameters[K + 5])
     chain = MCMC(
         NUTS(lambda: people(fit.answers, *known), target_accept_prob=0.9),
         num_warmup=1000,
@@ -65,9 +65,9 @@ def people(answers, means, logs, slope, lapse):
 def test_thresholds_of_people_are_those_that_a_sampler_finds(fit, drawn):
     """Means and spreads of each person's thresholds, over what 4000 draws tell them."""
     objective, quadrature = Objective(fit.answers, Family.WEIBULL, Prior()), Quadrature(fit.answers, Family.WEIBULL)
-    moments = laplace_moments(fit.numbers, *objective.marginal.centres(fit.numbers))
+    moments = laplace_moments(fit.parameters, *objective.marginal.centres(fit.parameters))
     for _ in range(3):
-        moments = integrate(quadrature, fit.numbers, moments, FINE).moments
+        moments = integrate(quadrature, fit.parameters, moments, FINE).moments
     by_shared = np.einsum("nka,nab,nkb->nk", moments.regression, moments.covariance, moments.regression)
     spread, theta = np.sqrt(moments.variance + by_shared), drawn["theta"]
     np.testing.assert_allclose((moments.threshold - theta.mean(axis=0)) / spread, 0.0, atol=0.1)
@@ -79,12 +79,12 @@ def test_thresholds_of_people_are_those_that_a_sampler_finds(fit, drawn):
 def test_the_population_is_where_a_sampler_puts_the_maximum(fit, drawn):
     """The gradient of the marginal likelihood is the sampler's mean of the gradient with everything known: by it the
     estimates are within a tenth of their standard errors of the maximum."""
-    mean, own, n = drawn["raw"].mean(axis=0), np.exp(fit.numbers[K + 1]), PEOPLE
+    mean, own, n = drawn["raw"].mean(axis=0), np.exp(fit.parameters[K + 1]), PEOPLE
     square = (drawn["raw"] ** 2).mean(axis=0).sum(axis=0)
     slope = np.zeros(K + 5)
-    slope[:K], slope[K + 2] = mean[:, 1 : K + 1].sum(axis=0) / own, mean[:, K + 1].sum() / np.exp(fit.numbers[K + 3])
+    slope[:K], slope[K + 2] = mean[:, 1 : K + 1].sum(axis=0) / own, mean[:, K + 1].sum() / np.exp(fit.parameters[K + 3])
     slope[LOG_SDS] = square[0] - n, square[1 : K + 1].sum() - K * n, square[K + 1] - n, square[K + 2] - n
-    slope += Objective(fit.answers, Family.WEIBULL, Prior()).penalty(fit.numbers)[1][: K + 5]
+    slope += Objective(fit.answers, Family.WEIBULL, Prior()).penalty(fit.parameters)[1][: K + 5]
     curvature = fit.curvature[: K + 5, : K + 5]  # the lapse rate is held
     off = np.linalg.solve(curvature, slope) / np.sqrt(np.diag(np.linalg.inv(curvature)))
     np.testing.assert_allclose(off, 0.0, atol=0.1)

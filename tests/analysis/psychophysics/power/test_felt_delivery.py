@@ -7,7 +7,7 @@ import pytest
 
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
 from analysis.psychophysics.power.felt_delivery import FeltDelivery, felt_delivery
-from analysis.psychophysics.power.simulated_study import Crowd, _feeling, simulate_study
+from analysis.psychophysics.power.simulated_study import Crowd, _feel_delivery, simulate_study
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack, play_run
 from protocols.procedure.staircase import begin, is_finished, step
 from protocols.trial import Phase
@@ -50,7 +50,7 @@ def slow_run(delivery, threshold_n, seed, rule=PUBLISHED, rove_db=0.0):
 @pytest.mark.parametrize("threshold_n", [0.3, 0.9, 2.2])
 def test_a_compiled_run_is_that_of_the_observer_of_sessions(delivery, threshold_n):
     t0, pace, threshold_db = AT_THRESHOLD[Family.WEIBULL], 1.7 * NEPER_PER_DB, 20 * np.log10(threshold_n)
-    who = _feeling(Participant(t0, pace, threshold_db, 0.03, 0.2, 0), delivery, 0)
+    who = _feel_delivery(Participant(t0, pace, threshold_db, 0.03, 0.2, 0), delivery, 0)
     for seed in range(8):
         track = Track(*(np.empty(MOST_TRIALS) for _ in range(3)), np.full(PUBLISHED.reversals, np.nan))
         n, *_ = play_run(pack(PUBLISHED), who, seed, track)

@@ -8,7 +8,7 @@ import pytest
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
 from analysis.psychophysics.power.compare_rules import ComparedPerson, answer_trials, compare_rules, compared_rules
 from analysis.psychophysics.power.felt_delivery import felt_delivery
-from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, _feeling, simulate_study
+from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, _feel_delivery, simulate_study
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack, play_run
 from protocols.procedure.staircase import begin, is_finished, step, to_db
 from tests.analysis.conftest import PUBLISHED
@@ -45,7 +45,7 @@ def test_a_compiled_run_is_the_plain_one_trial_by_trial(family, rove_db):
 @pytest.mark.parametrize("threshold_n", [0.3, 0.9, 2.2])
 def test_a_roved_run_is_that_of_the_observer_of_sessions(delivery, threshold_n):
     t0, pace = AT_THRESHOLD[Family.WEIBULL], 1.7 * NEPER_PER_DB
-    who = _feeling(Participant(t0, pace, to_db(threshold_n), 0.03, 0.2, 0), delivery, 0)
+    who = _feel_delivery(Participant(t0, pace, to_db(threshold_n), 0.03, 0.2, 0), delivery, 0)
     for seed in SEEDS:
         n, track = compiled(who, RULE, ROVE_DB, seed)
         slow = slow_run(delivery, threshold_n, seed, RULE, ROVE_DB)

@@ -77,7 +77,7 @@ def _one_step(bodies, linear, state, u, memories, at):
     before = [memory.copy() for memory in memories]
     motion = linear.motion
     for sweep in range(CONVERGED if items > 1 else 1):
-        for item, (act, port, numbers) in enumerate(zip(bodies.acts, bodies.port, bodies.numbers, strict=True)):
+        for item, (act, port, numbers) in enumerate(zip(bodies.acts, bodies.port, bodies.parameters, strict=True)):
             if sweep:
                 force[port] -= own[item, 0]
                 end[port] -= own[item, 1]

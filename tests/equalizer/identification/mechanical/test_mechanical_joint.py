@@ -5,8 +5,8 @@ import pytest
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitSettings
-from equalizer.identification.mechanical.mechanical_level import remove_friction_damping
 from equalizer.identification.mechanical.mechanical_structure import insert_joint
+from equalizer.identification.mechanical.rigid_body import remove_friction_damping
 from equalizer.plant.linear_simulation import linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment

@@ -11,7 +11,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
-from equalizer.tracking.compensation.without_effects import subtract_effects
+from equalizer.tracking.compensation.subtract_effects import subtract_effects
 from equalizer.tracking.feedforward.band_part import band_part
 
 RATE_HZ, BAND_HZ = 1000.0, (5.0, 35.0)

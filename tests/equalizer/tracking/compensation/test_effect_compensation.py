@@ -16,7 +16,7 @@ from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
 from equalizer.tracking.compensation.effect_roles import IN_MODEL, SENSORS
 from equalizer.tracking.compensation.known_forces import LAWS, deadband_share, equivalent_impedance
-from equalizer.tracking.compensation.without_effects import subtract_effects
+from equalizer.tracking.compensation.subtract_effects import subtract_effects
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.planned_motion import planned_motion
 from equalizer.tracking.learning.iteration import rms

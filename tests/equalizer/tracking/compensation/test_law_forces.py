@@ -10,7 +10,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
 from equalizer.tracking.compensation.law_forces import COMMANDS, FOLDED, REMEMBERS, SENSED, SEVERAL
-from equalizer.tracking.compensation.without_effects import subtract_effects
+from equalizer.tracking.compensation.subtract_effects import subtract_effects
 
 RATE_HZ, BAND_HZ, N = 1000.0, (5.0, 35.0), 1000
 FORCES, ACCELERATIONS = ("fx", "fy", "fz"), ("ax", "ay", "az")

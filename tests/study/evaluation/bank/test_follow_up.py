@@ -8,7 +8,7 @@ import json
 import pytest
 
 from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
-from analysis.evaluation.proof.follow_up import FollowUp, follow_up_figures
+from analysis.evaluation.blind_test.follow_up import FollowUp, follow_up_figures
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from study.errors import StudyError
 from study.evaluation.bank.follow_up import DRAWN, FURTHER, NEXT, PROPOSED, follow_up

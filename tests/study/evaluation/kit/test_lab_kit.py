@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.evaluation.proof.lab_kit import CHANGES, NOTHING
+from analysis.evaluation.blind_test.lab_kit import CHANGES, NOTHING
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from study.errors import StudyError
 from study.evaluation.kit.lab_kit import draw_labels, read_labels, seal_labels

@@ -72,7 +72,7 @@ def fitted(folder: Path, recording: Recording, structure: str = "auto") -> First
 
 
 def inside(done: FirstModel, name: str, truth: float) -> bool:
-    (number,) = [each for each in done.choice.fit.numbers if each.name == name]
+    (number,) = [each for each in done.choice.fit.parameters if each.name == name]
     return number.half is not None and abs(number.value - truth) <= number.half
 
 
@@ -86,7 +86,7 @@ def test_mass_damping_and_stiffness_come_back_within_their_intervals(tmp_path, s
 
 def test_the_intervals_are_no_wider_than_a_tenth_where_there_is_hardly_noise(tmp_path):
     done = fitted(tmp_path, recorded(device(0.4, 6.0, 900.0)), "mass-spring")
-    assert all(number.half is not None and number.half < 0.1 * number.value for number in done.choice.fit.numbers)
+    assert all(number.half is not None and number.half < 0.1 * number.value for number in done.choice.fit.parameters)
 
 
 def test_coupled_axes_give_symmetric_matrices(tmp_path):
@@ -151,7 +151,7 @@ def test_where_no_time_is_known_stiffness_alone_is_reported(tmp_path):
 def test_motion_in_and_force_out_is_turned_round(tmp_path):
     plain = recorded(device(0.4, 6.0, 900.0))
     done = fitted(tmp_path, replace(plain, command=plain.response, response=plain.command), "mass-spring")
-    assert done.choice.fit.numbers[2].value == pytest.approx(900.0, rel=0.05)
+    assert done.choice.fit.parameters[2].value == pytest.approx(900.0, rel=0.05)
 
 
 def test_the_file_says_which_way_a_command_is_counted(tmp_path):
@@ -220,5 +220,5 @@ def test_a_recording_whose_units_nothing_says_gets_a_model_and_what_was_assumed_
     write_recording(tmp_path / "bare.h5", bare)
     done = fit_first_model(FirstModelPlan((tmp_path / "bare.h5",), tmp_path / "m.toml"), lambda share: None)
     assert done.choice.fit.kind == "mass-spring"
-    assert done.choice.fit.numbers[0].value == pytest.approx(0.4, rel=0.02)
+    assert done.choice.fit.parameters[0].value == pytest.approx(0.4, rel=0.02)
     assert any("Nothing says what x measures: it was taken for a position" in remark for remark in done.remarks)

@@ -30,7 +30,7 @@ def test_a_crash_and_a_hang_are_problems_of_their_files_alone(tmp_path, monkeypa
     paths = [tmp_path / name for name in names]
     for path in paths:
         path.write_text("x = 1\n")
-    found = list(validate_files(paths, patience_s=5.0))
+    found = list(validate_files(paths, timeout_s=5.0))
     assert [v.path for v in found] == paths
     assert found[1].problems == ("The file is damaged: reading it crashes the HDF5 library. Restore it from a copy.",)
     assert "does not end within 5 s" in found[2].problems[0]
@@ -52,7 +52,7 @@ def test_a_worker_that_does_not_start_is_no_fault_of_a_file(tmp_path, monkeypatc
     path = tmp_path / "sound.toml"
     path.write_text("x = 1\n")
     monkeypatch.setattr(validate_apart, "_ready", start)
-    monkeypatch.setattr(validate_apart, "START_S", 2.0)
+    monkeypatch.setattr(validate_apart, "START_TIMEOUT_S", 2.0)
     with pytest.raises(StudyError) as refused:
         list(validate_files([path]))
     assert refused.value.title == "Files cannot be validated"

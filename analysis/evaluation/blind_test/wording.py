@@ -1,7 +1,7 @@
 """Figures and misses of a proof as sentences."""
 
-from analysis.evaluation.proof.outcome import Outcome
-from analysis.evaluation.proof.share import Figure
+from analysis.evaluation.blind_test.outcome import Outcome
+from analysis.evaluation.blind_test.share import Figure
 
 
 def figure_text(figure: Figure) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from analysis.evaluation.proof.share import Figure, share
+from analysis.evaluation.blind_test.share import Figure, share
 
 DETECTABLE = 1.25
 """Times that the held-out error of the device's base model changes, up or down, from which on a fault ought to be

@@ -23,15 +23,23 @@ from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_comp
 from equalizer.tracking.feedforward.planned_motion import planned_motion
 
 HIGHEST_SHARE = 3.0
-"""Upper end of the motion's band over that of the excitation, because friction has harmonics; and its lower end
-likewise."""
+"""Upper end of the band in which the motion is integrated, over the highest driven frequency: up to the third harmonic,
+the strongest that dry friction makes."""
 LOWEST_SHARE = 0.75
-"""Lower end of the compared band, relative to the lowest driven frequency."""
+"""Lower end of that band over the lowest driven frequency; below it, integration amplifies the sensor's noise and drift
+by 1/f². By hand."""
+NYQUIST_SHARE = 0.45
+"""Highest frequency of that band over the sample rate: below Nyquist by the room of the band's edge."""
 
 
 def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz: tuple[float, float]) -> Recording:
-    """The response must be the acceleration, axis by axis with the commands. excited_hz: band of the commands' power.
-    The excitation is not changed. Raises ValueError for another response, missing samples, unknown axes."""
+    """The recording with commands u - F(q, v) / g, where F is the force of the known effects along the measured motion
+    and g the gain of the axis's actuator.
+
+    The response must be the acceleration, axis by axis with the commands. excited_hz: band of the commands' power. The
+    excitation is not changed. Effects that act on the command are applied to it, before forces are subtracted. Raises
+    ValueError for another response, missing samples, unknown axes.
+    """
     inputs, outputs = recording.command.channels, recording.response.channels
     if recording.response.quantity != "acceleration" or len(inputs) != len(outputs):
         raise ValueError(
@@ -41,7 +49,7 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
     if not (np.isfinite(recording.response.samples).all() and np.isfinite(recording.command.samples).all()):
         raise ValueError("the recording has missing samples; a motion cannot be integrated across them")
     rate_hz = recording.sample_rate_hz
-    band_hz = (LOWEST_SHARE * excited_hz[0], min(HIGHEST_SHARE * excited_hz[1], 0.45 * rate_hz))
+    band_hz = (LOWEST_SHARE * excited_hz[0], min(HIGHEST_SHARE * excited_hz[1], NYQUIST_SHARE * rate_hz))
     planned = planned_motion(recording.response.samples, rate_hz, band_hz, lead_s(physics, rate_hz))
     motion = along_axes(planned, physics)
     gain, freed = axis_gains(physics, inputs, outputs), recording.command.samples.copy()

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.evaluation.proof.controlled import ControlOutcome
-from analysis.evaluation.proof.follow_up import FollowUp
-from analysis.evaluation.proof.outcome import Outcome
-from analysis.evaluation.proof.score import Score
-from analysis.evaluation.proof.share import Figure
-from analysis.evaluation.proof.wording import answer_text, concealed_text, figure_text, strength_text
+from analysis.evaluation.blind_test.controlled import ControlOutcome
+from analysis.evaluation.blind_test.follow_up import FollowUp
+from analysis.evaluation.blind_test.outcome import Outcome
+from analysis.evaluation.blind_test.score import Score
+from analysis.evaluation.blind_test.share import Figure
+from analysis.evaluation.blind_test.wording import answer_text, concealed_text, figure_text, strength_text
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
 
@@ -25,7 +25,7 @@ HOW = (
 
 
 @dataclass(frozen=True, slots=True)
-class ProofFacts:
+class BlindTestFacts:
     """Facts of a blind test beside its outcomes: seeds, seal, commit, engines, controls and further recordings."""
 
     seeds: str
@@ -37,11 +37,11 @@ class ProofFacts:
     followed: tuple[FollowUp, ...] = ()
 
 
-def render_proof_report(
+def render_blind_test_report(
     outcomes: Sequence[Outcome],
     score: Score,
     pictures: Sequence[Picture],
-    facts: ProofFacts,
+    facts: BlindTestFacts,
     provenance: Mapping[str, str],
     generated: str,
 ) -> str:
@@ -99,7 +99,7 @@ def _returned_text(recorded: str, returned: Sequence[str]) -> str:
     return (", ".join(returned) or "no name") if recorded else "-"
 
 
-def _fact_points(facts: ProofFacts) -> tuple[str, ...]:
+def _fact_points(facts: BlindTestFacts) -> tuple[str, ...]:
     return (
         f"Seeds {facts.seeds}.",
         f"SHA-256 of labels.sha256: {facts.seal}.",

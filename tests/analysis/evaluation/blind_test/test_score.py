@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
-from analysis.evaluation.proof.calibration import calibration
-from analysis.evaluation.proof.detection import classify_outcome, detection_strips, ideal_threshold, shares_by_size
-from analysis.evaluation.proof.follow_up import FollowUp
-from analysis.evaluation.proof.outcome import Concealed, Outcome
-from analysis.evaluation.proof.score import is_miss, score
-from analysis.evaluation.proof.share import pooled_share, share, statistic
-from analysis.evaluation.proof.wording import answer_text, concealed_text, figure_text
-from analysis.figures.proof_pictures import proof_pictures
-from analysis.reports.proof_report import ProofFacts, render_proof_report
+from analysis.evaluation.blind_test.calibration import calibration
+from analysis.evaluation.blind_test.detection import classify_outcome, detection_strips, ideal_threshold, shares_by_size
+from analysis.evaluation.blind_test.follow_up import FollowUp
+from analysis.evaluation.blind_test.outcome import Concealed, Outcome
+from analysis.evaluation.blind_test.score import is_miss, score
+from analysis.evaluation.blind_test.share import pooled_share, share, statistic
+from analysis.evaluation.blind_test.wording import answer_text, concealed_text, figure_text
+from analysis.figures.blind_test_pictures import blind_test_pictures
+from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 CELL = Mismatch("ax", "fx", (1.0, 5.0), None, None, 0.5, 0.001)
@@ -169,22 +169,22 @@ def test_larger_effects_come_later():
 
 def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
     whole = score(ALL)
-    pictures = proof_pictures(ALL, whole.calibration)
+    pictures = blind_test_pictures(ALL, whole.calibration)
     assert [picture.name for picture in pictures] == ["detection", "detection-by-size", "confusion", "reliability"]
     both = ("sensor_lag", "logger_offset")
     followed = (
         FollowUp(5, "sensor_lag", both, "a sweep from 1 to 450 Hz", ("sensor_lag",), "a slow sinusoid", both),
         FollowUp(6, "sensor_lag", both, "", (), "a slow sinusoid", ()),
     )
-    facts = ProofFacts("1 to 11", "ab" * 32, "c0ffee", ("d1",), ("One remark.",), (), followed)
-    page = render_proof_report(ALL, whole, pictures, facts, {}, "2026-01-01T00:00:00Z")
+    facts = BlindTestFacts("1 to 11", "ab" * 32, "c0ffee", ("d1",), ("One remark.",), (), followed)
+    page = render_blind_test_report(ALL, whole, pictures, facts, {}, "2026-01-01T00:00:00Z")
     assert page.index("Misses: 8") < page.index("Figures")
     assert "One remark." in page and "ab" * 32 in page
     assert "sensor_lag, logger_offset" in page and "nothing would tell" in page and "no name" in page
 
 
 def test_a_bank_of_nothing_has_no_pictures():
-    assert proof_pictures([CLEAN], calibration([CLEAN])) == ()
+    assert blind_test_pictures([CLEAN], calibration([CLEAN])) == ()
 
 
 def test_sentences_say_truth_and_answer():

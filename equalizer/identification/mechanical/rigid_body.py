@@ -1,4 +1,17 @@
-"""Friction's share in the damping of a linear fit, from recordings at two levels: it falls as the force grows."""
+"""Fit of the device as a rigid body at two levels, and the equivalent viscous damping of its friction.
+
+A linear fit takes dry friction for damping. By the describing function, Coulomb friction of level F under a sinusoidal
+motion of amplitude X and angular frequency w acts like the damping
+
+    c = 4 F / (pi w X)
+
+so c falls as 1 / X, and X grows in proportion to the force far above friction. With the fits at two levels, d1 at the
+stronger and d2 at the weaker, whose amplitudes have the ratio r > 1, the damping without friction is d1 - c with
+
+    c = (d2 - d1) / (r - 1)
+
+Reference: Gelb and Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design (1968), chapter 2.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,28 +27,29 @@ from equalizer.signals.signal import FloatArray
 
 RIGID_OCTAVES = 3.0
 """Width in octaves of the lowest part of the band, in which the device moves as a rigid body and friction matters
-most."""
+most. By hand."""
 LEAST_MASS, LEAST_DAMPING = 0.02, 0.05
-"""Smallest relative tolerances: how well a laboratory knows mass and damping."""
+"""Smallest tolerances, relative to the largest of all axes: how well a laboratory knows mass and damping. By hand."""
 OF_FRICTION = 0.2
-"""Relative tolerance of the damping that was subtracted for friction."""
+"""Tolerance of the damping that was subtracted for friction, relative to it: friction is not exactly Coulomb's. By
+hand."""
 MOST_OFF = 0.8
-"""Largest share of the fitted damping that is subtracted."""
+"""Largest share of the fitted damping that is subtracted, so that a damping above zero remains. By hand."""
 SPRING = 0.03
-"""Largest undetected stiffness, relative to the inertial force at the band's lower end."""
+"""Largest stiffness that the fit would not show, relative to the inertial force at the band's lower end. By hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidBody:
-    """The device in the band where it moves as a rigid body, at the stronger level."""
+    """The device in the band where it moves as a rigid body, at the stronger level. Arrays are (m,): driven axes."""
 
     up_to_hz: float
     mass: FloatArray
-    """(m,), at each driven axis"""
+    """kg"""
     damping: FloatArray
-    """(m,), the equivalent damping of friction contained in it."""
+    """N s/m, with the equivalent damping of friction in it."""
     of_friction: FloatArray
-    """(m,), the equivalent damping of friction: at forces far above friction the damping is lower by it."""
+    """N s/m, the equivalent damping of friction: at forces far above friction the damping is lower by it."""
     tolerance: Tolerance
     """Tolerance of the whole model without the equivalent damping."""
 
@@ -43,17 +57,17 @@ class RigidBody:
 def fit_rigid_body(
     fit: MechanicalFit, strong: Recording, weaker: Recording, settings: MechanicalFitSettings
 ) -> RigidBody:
-    """Rigid fits at two levels. The equivalent damping of friction is proportional to 1 / amplitude (describing
-    function): strong = true + c, weaker = true + c ratio."""
+    """Rigid fits of two recordings of the same device, at a stronger and a weaker level of the excitation. fit: that of
+    the whole band, whose tolerances are kept where they are wider. settings: its settings."""
     low, high = fit.band_hz
     up_to_hz = min(high, low * 2**RIGID_OCTAVES)
     rigid = replace(
         settings, band_hz=(low, up_to_hz), most_modes=0, joint=False, fit_delay=False, sensors_elsewhere=False
     )
     ratio = _amplitude(strong) / _amplitude(weaker)
-    mine, other = (_axis_values(fit_mechanical_model([each], rigid).model) for each in (strong, weaker))
-    mass, damping, _ = mine
-    of_friction = np.clip((other[1] - damping) / max(ratio - 1, 1e-3), 0.0, MOST_OFF * damping)
+    at_strong, at_weaker = (_axis_values(fit_mechanical_model([each], rigid).model) for each in (strong, weaker))
+    mass, damping, _ = at_strong
+    of_friction = np.clip((at_weaker[1] - damping) / max(ratio - 1, 1e-3), 0.0, MOST_OFF * damping)
     own = fit.model.tolerance or Tolerance()
     heaviest = float(mass.max())
     tolerance = Tolerance(
@@ -68,7 +82,7 @@ def fit_rigid_body(
 
 
 def remove_friction_damping(model: MechanicalModel, of_friction: FloatArray) -> MechanicalModel:
-    """The model without friction's equivalent damping of_friction (m,), at the driven axes."""
+    """The model without friction's equivalent damping. of_friction: (m,), N s/m at each driven axis."""
     along = driven_axes(model)
     return replace(model, damping=model.damping - (along * of_friction) @ along.T)
 
@@ -80,4 +94,5 @@ def _axis_values(model: MechanicalModel) -> FloatArray:
 
 
 def _amplitude(recording: Recording) -> float:
+    """Largest amplitude of a recording's excitation, in the command's unit."""
     return max(segment.amplitude for segment in recording.segments)

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from analysis.evaluation.proof.calibration import Calibration
-from analysis.evaluation.proof.detection import EffectDraws, detection_strips, shares_by_size
-from analysis.evaluation.proof.outcome import Outcome
+from analysis.evaluation.blind_test.calibration import Calibration
+from analysis.evaluation.blind_test.detection import EffectDraws, detection_strips, shares_by_size
+from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes, ratio_ticks
 
@@ -21,7 +21,7 @@ MARKS = {"right": ("o", BLUE), "in the set": ("D", ORANGE), "missed": ("X", VERM
 NO_ANSWER = "no name"
 
 
-def proof_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
+def blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
     """Pictures of detection, sizes and confusion where single effects were drawn, and of reliability where names were
     given."""
     singles = [outcome for outcome in outcomes if outcome.kind == "single"]

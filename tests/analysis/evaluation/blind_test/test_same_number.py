@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from analysis.evaluation.proof.score import nearest_true_value
+from analysis.evaluation.blind_test.score import nearest_true_value
 
 
 @pytest.mark.parametrize(("said", "true"), [(-3.0, 2 * math.pi - 3.0), (0.1, 6.2), (13.0, 0.43)])

@@ -30,14 +30,20 @@ _LABELS: dict[Quantity, str] = {
 }
 _SPREAD = 0.4
 """Width taken by the participants of one frequency, in steps between frequencies."""
+_MEDIAN_HALF_WIDTH = 0.32
+"""Half-length of the line of a median, in the same steps: a little wider than the participants."""
+_PANEL_IN, _LEGEND_IN = 2.5, 0.4
+"""Height of a row of panels, and of the legend above them (inches)."""
+_ROOM_BELOW, _ROOM_ABOVE = 0.8, 1.35
+"""Limits of a log axis over the smallest and the largest value."""
 
 
-def draw_units(tables: Sequence[ThresholdTable]) -> Figure:
-    """One panel per table with any value that `is_drawn`, at least one. Tables: the same participants and
-    frequencies."""
+def draw_thresholds_by_unit(tables: Sequence[ThresholdTable]) -> Figure:
+    """One panel per table: participants by colour and marker over frequency, and their median. tables: one per unit,
+    at least one, of the same participants and frequencies, each with a value that `is_drawn`."""
     columns = 2 if len(tables) > 1 else 1
     lines = -(-len(tables) // columns)
-    figure = new_figure(PAGE_IN, 2.5 * lines + 0.4)
+    figure = new_figure(PAGE_IN, _PANEL_IN * lines + _LEGEND_IN)
     places = [axes for line in figure.subplots(lines, columns, squeeze=False) for axes in line]
     for axes, table in zip(places, tables, strict=False):
         _draw_table(axes, table)
@@ -48,7 +54,8 @@ def draw_units(tables: Sequence[ThresholdTable]) -> Figure:
 
 
 def is_drawn(value: float | None, quantity: Quantity) -> bool:
-    """A ratio scale has no zero: an accelerometer that stands still makes one of every threshold."""
+    """Whether a threshold has a place in its panel. A log axis has no zero, which is what an accelerometer that gives
+    nothing makes of a threshold in m/s²; dB above detection may be negative."""
     return value is not None and (value > 0 or quantity == "above_detection_db")
 
 
@@ -66,7 +73,13 @@ def _draw_table(axes: Axes, table: ThresholdTable) -> None:
     for place, column in enumerate(values.T):
         if np.isfinite(column).any():
             median = float(np.nanmedian(column))
-            axes.plot([place - 0.32, place + 0.32], [median, median], color=BLACK, linewidth=2.2, zorder=4)
+            axes.plot(
+                [place - _MEDIAN_HALF_WIDTH, place + _MEDIAN_HALF_WIDTH],
+                [median, median],
+                color=BLACK,
+                linewidth=2.2,
+                zorder=4,
+            )
     axes.set_xticks(range(len(table.frequencies_hz)), [f"{f:g}" for f in table.frequencies_hz])
     axes.set_xlabel("Frequency (Hz)", fontsize=9)
     axes.set_ylabel(_LABELS[table.quantity], fontsize=9)
@@ -75,7 +88,7 @@ def _draw_table(axes: Axes, table: ThresholdTable) -> None:
         axes.margins(y=0.12)
         return
     axes.set_yscale("log")
-    low, high = 0.8 * float(np.nanmin(values)), 1.35 * float(np.nanmax(values))
+    low, high = _ROOM_BELOW * float(np.nanmin(values)), _ROOM_ABOVE * float(np.nanmax(values))
     axes.set_ylim(low, high)
     ratio_ticks(axes.yaxis, low, high)
 

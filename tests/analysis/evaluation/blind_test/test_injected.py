@@ -2,7 +2,7 @@
 
 import pytest
 
-from analysis.evaluation.proof.injected import DETECTABLE, injected_figures, read_outcome, tallies
+from analysis.evaluation.blind_test.injected import DETECTABLE, injected_figures, read_outcome, tallies
 from analysis.reports.injected_section import figure_text, injected_section, kind_of
 
 PLACES = {"sensor_lag": "sensor", "sensor_gain": "sensor", "amplifier_lag": "actuator", "added_mass": "mechanism"}

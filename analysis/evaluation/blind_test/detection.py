@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.evaluation.proof.outcome import DETECTABLE, Outcome
-from analysis.evaluation.proof.share import wilson
+from analysis.evaluation.blind_test.outcome import DETECTABLE, Outcome
+from analysis.evaluation.blind_test.share import wilson
 
 PARTS = 10
 """Bins of the detection curve over strength, with equally many cases each."""

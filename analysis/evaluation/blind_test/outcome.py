@@ -7,8 +7,8 @@ from math import hypot
 from analysis.diagnosis.document import Diagnosis, NamedEffect
 
 DETECTABLE = 1.25
-"""Ratio of the re-tuned model's rms error to the noise, in the worst channel, on held-out samples, above which an
-effect counts as detectable."""
+"""Ratio of the re-tuned model's rms error to the noise's rms, in the worst channel, on held-out samples, above which an
+effect counts as detectable: the model then leaves an error of sqrt(1.25² - 1) = 0.75 of the noise. By hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Outcome:
     strengths: tuple[float, ...]
     """0 = the weakest that is drawn, 1 = the strongest."""
     adds: float
-    """Change of the readings by the concealed effects: rms over the noise's, in the worst channel."""
+    """Change of the readings by the concealed effects, simulated: rms over the noise's rms, in the worst channel."""
     diagnosis: Diagnosis | None
     """The diagnosis; None: it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
@@ -69,18 +69,20 @@ class Outcome:
     @property
     def seen_by_ideal_observer(self) -> bool:
         """Whether the effects show in a simulation of the same device with and without them, before a re-tuned model
-        hides part of them."""
+        hides part of them: their change and the independent noise add up in power."""
         return hypot(1.0, self.adds) > DETECTABLE
 
     @property
     def right(self) -> bool:
-        """Exactly the concealed effects are named."""
+        """Whether exactly the concealed effects are named; their places and parameters are scored elsewhere."""
         return sorted(self.named_names) == sorted(self.names)
 
     @property
     def returned(self) -> tuple[str, ...]:
+        """The set of effects that the diagnosis holds for possible; empty where it failed."""
         return () if self.diagnosis is None else self.diagnosis.returned_set
 
     def left(self, stage: str) -> float:
-        """Error over noise in the worst channel; nan where it is not known."""
+        """Rms error on held-out samples over the noise's rms, in the worst channel; NaN where it is not known. stage:
+        "before", "retuned" or "after"."""
         return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))

@@ -1,10 +1,15 @@
-"""Blind test on a device that a lab changes on purpose: the changes, the expected answers, and the scoring."""
+"""Blind test on a device that a lab changes on purpose: the changes, the expected answers, and the scoring.
+
+A change is right where the diagnosis returns one of the effects that it may show as: a loosened cable is backlash or a
+loose joint, depending on its slack. The control, a change that changes nothing, counts against a diagnosis that names
+anything. A value that was weighed or measured beforehand is compared with the 95 % interval of the first parameter.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.document import Diagnosis
-from analysis.evaluation.proof.share import Figure, share
+from analysis.evaluation.blind_test.share import Figure, share
 
 NOTHING, MISSING = "nothing", "missing"
 """Name of the change that changes nothing (control); verdict of a recording without a diagnosis."""
@@ -18,9 +23,10 @@ class Change:
     how: str
     """Instruction to the lab."""
     effects: tuple[str, ...]
-    """Effects of which any is a right answer; empty for the control."""
+    """Effects of which any is a right answer; empty for the control. The value is a parameter of the first of them."""
     unit: str
-    """Unit of the value that the lab writes down for this change; empty where there is none."""
+    """Unit of the value that the lab writes down for this change, the same as of the effect's first parameter; empty
+    where there is none."""
 
 
 CHANGES: tuple[Change, ...] = (
@@ -72,17 +78,22 @@ class Label:
 
 @dataclass(frozen=True, slots=True)
 class Scored:
-    """A diagnosis beside the change that was made."""
+    """A diagnosis beside the change that was made; one row of the scored table."""
 
     recording: str
     change: str
     value: float | None
+    """In the unit of the change; None where the lab wrote none down."""
     verdict: str
+    """The diagnosis's, or `MISSING`."""
     named: str
+    """Effects that the diagnosis names, separated by spaces."""
     returned: str
+    """Effects that it holds for possible, separated by spaces."""
     right: bool
     inside: bool | None
-    """Whether the written number lies in the interval of what was named; None where it cannot be asked."""
+    """Whether the written value lies in the 95 % interval of the effect named; None where no value was written or the
+    effect was not named."""
 
 
 def score_label(label: Label, diagnosis: Diagnosis) -> Scored:
@@ -110,6 +121,7 @@ def score_unanswered(label: Label) -> Scored:
 
 
 def _is_in_interval(label: Label, diagnosis: Diagnosis, wanted: Sequence[str]) -> bool | None:
+    """As `Scored.inside`; asked of the first of the wanted effects alone, whose parameter has the value's unit."""
     for effect in diagnosis.effects:
         ends = next(iter(effect.parameters.values())).ci95 if effect.parameters else None
         if effect.effect == next(iter(wanted), "") and ends is not None and label.value is not None:
