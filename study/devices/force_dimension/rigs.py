@@ -1,5 +1,6 @@
 """Builds the rig of a named device: library, device, watchdog and its test, gravity compensation."""
 
+import math
 import time
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -14,6 +15,7 @@ from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rig import ForceDimensionRig
 from study.devices.force_dimension.watchdog_check import check_watchdog
+from study.errors import DeviceError
 
 RATE_HZ = 1000.0
 """Rate of the loop (Hz)."""
@@ -59,12 +61,21 @@ def _rig(
 
 
 def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
-    """Facts about an open device. Raises `LibraryError`."""
+    """Facts about an open device. Raises `LibraryError`, and `DeviceError` where its firmware is not known: an acceptance
+    that is void after another firmware would then hold for every one."""
+    firmware = handle.firmware()
+    if not 0 < firmware < math.inf:
+        raise DeviceError(
+            f"The {model.name} does not say its firmware",
+            f"Its library gives {firmware:g} as the version, so no acceptance can be known to hold for it. Nothing has "
+            "moved.",
+            "Switch the device off and on, then try again; else install the vendor's newest SDK or firmware.",
+        )
     return DeviceInfo(
         name=model.name,
         simulated=False,
         sample_rate_hz=RATE_HZ,
         max_force_n=model.max_force_n,
         effective_mass_kg=effective_mass_kg or model.effective_mass_kg,
-        details=f"serial {handle.serial()}, firmware {handle.firmware():g}, SDK {library.version_text}",
+        details=f"serial {handle.serial()}, firmware {firmware:g}, SDK {library.version_text}",
     )

@@ -24,7 +24,7 @@
 #endif
 
 #define SWITCHES(X)                                                                                                    \
-  X(devices, 1) X(type, 33) X(sdk_minor, 17) X(in_use, 0) X(open_fails, 0) X(calibrated, 1) X(powered, 1)              \
+  X(devices, 1) X(type, 33) X(sdk_minor, 17) X(firmware, 2.41) X(in_use, 0) X(open_fails, 0) X(calibrated, 1) X(powered, 1)              \
   X(wall_time, 1) X(mass, 0.25) X(damping, 2) X(stiffness, 0) X(weight, 0) X(max_n, 12)                                \
   X(watchdog_works, 1) X(watchdog_settable, 1) X(watchdog_stretch, 1) X(latches, 1) X(force_enables, 1)                \
   X(unplugged, 0) X(unwritten, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
@@ -294,7 +294,7 @@ EXPORT int dhdStop(char id) {
 EXPORT int dhdGetSystemType(char id) { (void)id; int code = begin(); return end(code ? code : (int)p[type]); }
 EXPORT const char *dhdGetSystemName(char id) { (void)id; return p[type] == 33 ? "omega.3" : "another device"; }
 EXPORT int dhdGetSerialNumber(unsigned short *serial, char id) { (void)id; PLAIN(*serial = 4242); }
-EXPORT int dhdGetVersion(double *version, char id) { (void)id; PLAIN(*version = 2.41); }
+EXPORT int dhdGetVersion(double *version, char id) { (void)id; PLAIN(*version = p[firmware]); }
 EXPORT int dhdGetStatus(int *status, char id) {
   (void)id;
   PLAIN(memset(status, 0, 17 * sizeof(int)); status[0] = p[powered] != 0; status[1] = status[2] = 1;
