@@ -61,8 +61,8 @@ def _rig(
 
 
 def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
-    """Facts about an open device. Raises `LibraryError`, and `DeviceError` where its firmware is not known: an acceptance
-    that is void after another firmware would then hold for every one."""
+    """Facts about an open device. Raises `LibraryError`, and `DeviceError` where its firmware is not known: an
+    acceptance that is void after another firmware would then hold for every one."""
     firmware = handle.firmware()
     if not 0 < firmware < math.inf:
         raise DeviceError(

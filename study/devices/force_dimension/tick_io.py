@@ -132,12 +132,25 @@ def _wake_device(calls: Addresses, cells: FloatArray) -> int:
     code = check_on(calls, cells)
     if code >= 0:
         return code
+    if cells[CLOSED] != 0.0:
+        return record_failure(cells, IS_CLOSED)
     number = np.int32(cells[NUMBER])
     if call_int(calls[BRAKES], (np.int32(0), number)) < 0:
         return record_library_failure(cells, BRAKES)
-    if call_int(calls[ENABLE], (np.int32(1), number)) < 0:
+    if cells[CLOSED] == 0.0 and call_int(calls[ENABLE], (np.int32(1), number)) < 0:
         return record_library_failure(cells, ENABLE)
+    if cells[CLOSED] != 0.0:
+        return _brake_again(calls, cells)
     return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else record_library_failure(cells, FORCE)
+
+
+@part
+def _brake_again(calls: Addresses, cells: FloatArray) -> int:
+    """A call that was to wake the device hung while it was closed, and came through after: it is taken back."""
+    number = np.int32(cells[NUMBER])
+    call_int(calls[ENABLE], (np.int32(0), number))
+    call_int(calls[BRAKES], (np.int32(1), number))
+    return record_failure(cells, IS_CLOSED)
 
 
 @part

@@ -51,7 +51,7 @@ typedef struct {
   double values[COUNT], position[3], velocity[3], commanded[3], told[3], swung[3], swinging[3], started, integrated, commanded_at, reset_at;
   double used; /* Since it was opened, a force was sent. */
   char failing[40], late[40]; /* Names of functions: see stub_fail and stub_delay. */
-  double failing_code, failures_left, delay_s;
+  double failing_code, failures_left, delay_s, delays_left;
 } Device;
 static Device own = {.values = {SWITCHES(AS_VALUE)}, .started = -1};
 static Device *device = &own;
@@ -197,7 +197,9 @@ static int is_to_fail(const char *function) {
   return fail((int)device->failing_code);
 }
 static void delay(const char *function) {
-  if (!strcmp(function, device->late)) come_late(1, 1, device->delay_s);
+  if (strcmp(function, device->late) || device->delays_left <= 0) return;
+  device->delays_left--;
+  come_late(1, 1, device->delay_s);
 }
 static int begin_of(const char *function) {
   start(), delay(function), lock(), catch_up();
@@ -236,17 +238,17 @@ EXPORT void stub_set(const char *name, double value) {
   if (i == frozen) memcpy(shown, x, sizeof x);
   unlock();
 }
-/* The next calls of a function of the vendor's, so many, answer -1 with this error; each of its calls takes so long. */
+/* The next calls of a function of the vendor's, so many, answer -1 with this error; so many of its calls take so long. */
 EXPORT void stub_fail(const char *function, double code, double times) {
   lock(), start();
   strncpy(device->failing, function, sizeof device->failing - 1);
   device->failing_code = code, device->failures_left = times;
   unlock();
 }
-EXPORT void stub_delay(const char *function, double seconds) {
+EXPORT void stub_delay(const char *function, double seconds, double times) {
   lock(), start();
   strncpy(device->late, function, sizeof device->late - 1);
-  device->delay_s = seconds;
+  device->delay_s = seconds, device->delays_left = times;
   unlock();
 }
 EXPORT double stub_get(const char *name) {
