@@ -49,7 +49,8 @@ def test_a_fault_of_the_device_is_said_with_what_is_saved_and_what_to_do(stub, s
     assert "The session is not finished" in said
     assert words in said
     assert "answers are on disk" in said or "answer is on disk" in said
-    assert "hapteq doctor --device" in said
-    assert "hapteq resume" in said
+    assert "Run hapteq doctor --device omega3, which says what is wrong with it" in said
+    (session,) = {log.parent for log in (tmp_path / "data").rglob("events.jsonl")}
+    assert f"Go on with: hapteq resume {session} --device omega3" in said
     assert not stub.applied_n.any()
     assert stub.get("peak_n") <= 4.5
