@@ -53,8 +53,9 @@ from study.devices.governor.govern import VECTOR
 from study.devices.native import Addresses, acquire, call_int, now_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
 
-LOOK_EVERY = 10
-"""Ticks between two readings of status and buttons (100 Hz at 1 kHz: a person cannot press faster)."""
+LOOKS_OF, LOOKS_AT = 42.0, (0.0, 8.0, 18.0, 29.0)
+"""Of so many ticks those at which status, buttons and the reported force are read (95 Hz at 1 kHz: a person cannot
+press faster). Uneven, so that no stimulus is looked at in the same two phases of its period again and again."""
 
 STALE_FOR, STALE_SHARE = 50, 0.5
 """Readings that only repeat an earlier one: so many in a row, or as many beyond this share of all readings, end the
@@ -100,7 +101,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     answer = call_int(calls[POSITION], asked)
     if answer < 0:
         return record_library_failure(cells, POSITION)
-    if cells[READS] % LOOK_EVERY == 0.0:
+    if cells[READS] % LOOKS_OF in LOOKS_AT:
         code = look(calls, cells)
         if code != 0:
             return code
@@ -166,7 +167,7 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     if answer < 0:
         return record_library_failure(cells, FORCE)
     cells[SENT_S] = began_s
-    note_sent(cells, x, y)
+    note_sent(cells, x, y, z)
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
     cells[TOO_STRONG] = count_beyond_share(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
     if cells[TOO_STRONG] >= SCALED_FOR * (1.0 - SCALED_SHARE):
@@ -184,7 +185,7 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
         code = check_on(calls, cells)
         if code != 0 and code != RELEASED:
             return code
-    note_sent(cells, 0.0, 0.0)
+    note_sent(cells, 0.0, 0.0, 0.0)
     cells[SENT_ZERO], cells[TOO_STRONG] = 1.0, 0.0
     if not _is_silent(calls, cells):
         cells[SENT_S] = began_s

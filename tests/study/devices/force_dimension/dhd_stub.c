@@ -32,6 +32,7 @@
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
   X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                   \
+  X(silent_gain, 1) X(told_step, 0) X(told_noise, 0) /* scaled without a word; the reported force in steps, with noise (rms), N */ \
   X(silently_n, 1e9) /* a cap of its own, of which no answer says anything */ X(turned, 0) /* force the other way */                                                                  \
   /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
   X(friction, 0) X(gain, 1) X(mode_hz, 0) X(mode_kg, 0.02)                                                             \
@@ -211,7 +212,7 @@ static int end(int code) { unlock(); return code; }
 
 /* An accelerometer at the handle: newest_sample.py says what stands in its rows. Its clock is `time.monotonic`. */
 static double *samples;
-static unsigned long long drawn;
+static unsigned long long drawn = 88172645463325252ULL;
 static double evenly(void) { /* -0.5 to 0.5; Marsaglia, Xorshift RNGs, 2003 */
   drawn ^= drawn << 13, drawn ^= drawn >> 7, drawn ^= drawn << 17;
   return (double)drawn / 18446744073709551616.0 - 0.5;
@@ -348,6 +349,7 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
     code = share < 1 ? 2 : 0;
     if (asked * share > p[silently_n]) share = p[silently_n] / asked;
     if (p[turned]) share = -share;
+    share *= p[silent_gain];
     command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
     p[writes]++, p[last_write] = asked, last_command_s = p[now];
     if (asked > 0) device->used = 1;
@@ -361,7 +363,11 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
 }
 EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
   (void)id;
-  PLAIN(*x_n = p[gain_told] * p[fx]; *y_n = p[gain_told] * p[fy]; *z_n = p[gain_told] * p[fz]);
+  double *told[3] = {x_n, y_n, z_n}, step = p[told_step];
+  PLAIN(for (int i = 0; i < 3; i++) {
+    double said = p[gain_told] * p[fx + i] + p[told_noise] * 3.4641016 * evenly();
+    *told[i] = step > 0 ? step * round(said / step) : said;
+  });
 }
 EXPORT double dhdGetComFreq(char id) { (void)id; return 1.0; }
 EXPORT unsigned int dhdGetButtonMask(char id) {
