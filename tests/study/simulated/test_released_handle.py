@@ -34,12 +34,13 @@ def vars_of(hand: Hand) -> tuple[tuple[float, ...], ...]:
     return hand.mass_kg, hand.damping_n_s_per_m, hand.stiffness_n_per_m
 
 
-def rise_db(frequency_hz: float, before: float, after: float, seed: int) -> float:
-    """Of the acceleration in the last second of a held stimulus, when the grip changes in the middle of it."""
+def rise_db(frequency_hz: float, before: float, after: float, seed: int, gain: float = 1.0) -> float:
+    """Of the acceleration in the last second of a held stimulus, when the grip changes in the middle of it. gain: of
+    the motors after the change, as if from the beginning."""
     found = []
-    for grip in (before, after):
+    for grip, given in ((before, 1.0), (after, gain)):
         rig = replace(build_omega3(seed, hand=True), parameters=gripped(before))
-        wave = LEVEL_N * np.sin(2 * np.pi * frequency_hz * np.arange(200) / 1000)[:, None] * VECTOR
+        wave = given * LEVEL_N * np.sin(2 * np.pi * frequency_hz * np.arange(200) / 1000)[:, None] * VECTOR
         loop = Signal(wave, 1000.0, "force", "N", ("fx", "fy", "fz"))
         clock = VirtualClock()
         with contextlib.closing(SafeDevice(rig, device_settings(PROTOCOL), clock)) as device:
@@ -65,3 +66,13 @@ def test_a_released_grip_is_seen_in_the_response_and_so_is_one_that_only_became_
     light_released = {frequency: rise_db(frequency, 0.25, 0.0, seed) for frequency in released}
     # No threshold on the change names the release alone.
     assert all(lighter[frequency] > light_released[frequency] > 0.3 for frequency in released)
+
+
+def test_motors_that_give_30_percent_less_look_like_a_firmer_grip():
+    """Why no limit on what trials delivered watches the motors: it would stop firm grips, or miss this."""
+    for frequency_hz in (25.0, 35.0, 45.0):
+        weaker = rise_db(frequency_hz, 1.0, 1.0, 1, gain=0.7)
+        assert -3.2 < weaker < -2.6
+        assert rise_db(frequency_hz, 1.0, 3.0, 1) < weaker < rise_db(frequency_hz, 1.0, 1.5, 1)
+        # From a light grip to a firm one, it changes by more.
+        assert rise_db(frequency_hz, 0.5, 2.0, 1) < weaker
