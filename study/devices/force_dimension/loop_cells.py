@@ -54,7 +54,10 @@ WEIGHT = SENT + 3 * MEMORY
 """Cells of the sums for the gain: number, reported force (x, y, z), its square; from LAGGED on, for each age of the
 report in ticks: sent force (x, y, z), its square, its product with the reported one."""
 LAGGED, OF_LAG = WEIGHT + 5, 5
-CELLS_SIZE = LAGGED + OF_LAG * MEMORY
+STILL_TOLD = LAGGED + OF_LAG * MEMORY
+STILL_ODD = STILL_TOLD + 3
+"""Force that the device reports after a zero (x, y, z; N), and how often in a row it was one."""
+CELLS_SIZE = STILL_ODD + 1
 
 OF_LIBRARY = 1
 """Error code of a failed call of the first function of LIBRARY; the codes of the others follow."""
@@ -135,7 +138,7 @@ def _gives_another(cells: FloatArray) -> bool:
 @part
 def _add_to_sums(cells: FloatArray) -> None:
     """Add the newest status check to the sums for the gain; those before lose weight."""
-    for place in range(WEIGHT, CELLS_SIZE):
+    for place in range(WEIGHT, STILL_TOLD):
         cells[place] *= 1.0 - 1.0 / REMEMBERED
     cells[WEIGHT] += 1.0
     for i in range(3):
@@ -203,8 +206,19 @@ def _check_given(calls: Addresses, cells: FloatArray) -> int:
 def look(calls: Addresses, cells: FloatArray) -> int:
     """Read buttons, status and the reported force. Returns 0 or an error code."""
     pressed = call_int(calls[BUTTONS], (np.int32(cells[NUMBER]),))
-    if pressed == -1:  # no device has 32 buttons
+    if pressed < 0:  # no device has 32 buttons
         return record_library_failure(cells, BUTTONS)
     cells[PRESSED] = pressed & 0xFFFFFFFF
     code = max(0, check_on(calls, cells))
     return code if code != 0 else _check_given(calls, cells)
+
+
+@part
+def check_still(calls: Addresses, cells: FloatArray) -> int:
+    """After a zero that was sent while nothing is played: 0, or an error code where the device says that it gives a
+    force all the same, again and again."""
+    place = cells.ctypes.data + 8 * STILL_TOLD
+    asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
+    told = call_int(calls[GIVEN], asked) >= 0 and math.hypot(cells[STILL_TOLD], cells[STILL_TOLD + 1]) > ODD_N
+    cells[STILL_ODD] = cells[STILL_ODD] + 1.0 if told else 0.0
+    return 0 if cells[STILL_ODD] < ODD_FOR else record_failure(cells, GIVES_ANOTHER)

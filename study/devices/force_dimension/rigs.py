@@ -9,7 +9,7 @@ from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.force_dimension.acceptance import check_accepted
 from study.devices.force_dimension.connect import device_error, load_library, make_ready, open_model
-from study.devices.force_dimension.handle import Handle
+from study.devices.force_dimension.handle import NO_SERIAL, Handle
 from study.devices.force_dimension.lab import LabSettings, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
@@ -61,21 +61,26 @@ def _rig(
 
 
 def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
-    """Facts about an open device. Raises `LibraryError`, and `DeviceError` where its firmware is not known: an
-    acceptance that is void after another firmware would then hold for every one."""
-    firmware = handle.firmware()
+    """Facts about an open device. Raises `LibraryError`, and `DeviceError` where its firmware or serial number is not
+    known: an acceptance that is void for another would then hold for every one."""
+    firmware, serial = handle.firmware(), handle.serial()
     if not 0 < firmware < math.inf:
-        raise DeviceError(
-            f"The {model.name} does not say its firmware",
-            f"Its library gives {firmware:g} as the version, so no acceptance can be known to hold for it. Nothing has "
-            "moved.",
-            "Switch the device off and on, then try again; else install the vendor's newest SDK or firmware.",
-        )
+        raise _unknown_error(model, "firmware", f"gives {firmware:g} as the version")
+    if serial == NO_SERIAL:
+        raise _unknown_error(model, "serial number", "answers and gives none")
     return DeviceInfo(
         name=model.name,
         simulated=False,
         sample_rate_hz=RATE_HZ,
         max_force_n=model.max_force_n,
         effective_mass_kg=effective_mass_kg or model.effective_mass_kg,
-        details=f"serial {handle.serial()}, firmware {firmware:g}, SDK {library.version_text}",
+        details=f"serial {serial}, firmware {firmware:g}, SDK {library.version_text}",
+    )
+
+
+def _unknown_error(model: DeviceModel, what: str, said: str) -> DeviceError:
+    return DeviceError(
+        f"The {model.name} does not say its {what}",
+        f"Its library {said}, so no acceptance can be known to hold for it. Nothing has moved.",
+        "Switch the device off and on, then try again; else install the vendor's newest SDK or firmware.",
     )

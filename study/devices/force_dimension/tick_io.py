@@ -42,6 +42,7 @@ from study.devices.force_dimension.loop_cells import (
     WEAK,
     WITHHELD_UNTIL_S,
     check_on,
+    check_still,
     count_beyond_share,
     look,
     note_sent,
@@ -140,18 +141,18 @@ def _wake_device(calls: Addresses, cells: FloatArray) -> int:
         return record_library_failure(cells, BRAKES)
     if cells[CLOSED] == 0.0 and call_int(calls[ENABLE], (np.int32(1), number)) < 0:
         return record_library_failure(cells, ENABLE)
-    if cells[CLOSED] != 0.0:
-        return _brake_again(calls, cells)
+    if cells[CLOSED] != 0.0:  # the call hung while the device was closed: it is taken back
+        _brake(calls, cells)
+        return record_failure(cells, IS_CLOSED)
     return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else record_library_failure(cells, FORCE)
 
 
 @part
-def _brake_again(calls: Addresses, cells: FloatArray) -> int:
-    """A call that was to wake the device hung while it was closed, and came through after: it is taken back."""
+def _brake(calls: Addresses, cells: FloatArray) -> None:
+    """Forces off and brakes on. Whether the device takes that is not asked."""
     number = np.int32(cells[NUMBER])
     call_int(calls[ENABLE], (np.int32(0), number))
     call_int(calls[BRAKES], (np.int32(1), number))
-    return record_failure(cells, IS_CLOSED)
 
 
 @part
@@ -227,14 +228,18 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 @part
 def _rest(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
-    """Repeat a zero where nothing is played. The lock is never kept while the interpreter is waited for: the loop's
-    next force waits no longer than `LOCK_S` for it."""
+    """Repeat a zero where nothing is played, and brake where the device does not take it. The lock is never kept while
+    the interpreter is waited for: the loop's next force waits no longer than `LOCK_S` for it."""
     if not acquire(calls, LOCK_S):
         return 0
     code = 0
     resting = cells[SENT_ZERO] != 0.0 and now_s(calls) - cells[SENT_S] >= every_s
     if resting and cells[CLOSED] == 0.0 and cells[FAILED] == 0.0:
         code = _send_force(calls, cells, force)
+        if code == 0:
+            code = check_still(calls, cells)
+            if code != 0:
+                _brake(calls, cells)
     release(calls)
     return code
 

@@ -24,7 +24,7 @@
 #endif
 
 #define SWITCHES(X)                                                                                                    \
-  X(devices, 1) X(type, 33) X(sdk_minor, 17) X(firmware, 2.41) X(in_use, 0) X(open_fails, 0) X(calibrated, 1) X(powered, 1)              \
+  X(devices, 1) X(type, 33) X(sdk_minor, 17) X(firmware, 2.41) X(serial_told, 1) X(serial_no, 4242) X(in_use, 0) X(open_fails, 0) X(calibrated, 1) X(powered, 1)              \
   X(wall_time, 1) X(mass, 0.25) X(damping, 2) X(stiffness, 0) X(weight, 0) X(max_n, 12)                                \
   X(watchdog_works, 1) X(watchdog_settable, 1) X(watchdog_stretch, 1) X(latches, 1) X(force_enables, 1)                \
   X(unplugged, 0) X(unwritten, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
@@ -32,6 +32,7 @@
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
   X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                   \
+  X(answer_of_errors, -1) /* of functions that fail */ X(keeps_force, 0) /* a zero is answered and not given */                               \
   X(silent_gain, 1) X(told_step, 0) X(told_noise, 0) /* scaled without a word; the reported force in steps, with noise (rms), N */ \
   X(silently_n, 1e9) /* a cap of its own, of which no answer says anything */ X(turned, 0) /* force the other way */                                                                  \
   /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
@@ -189,7 +190,7 @@ static void come_late(double count, double every, double late) {
   }
 }
 
-static int fail(int code) { last_error = code; return -1; }
+static int fail(int code) { last_error = code; return (int)p[answer_of_errors]; }
 static int answer(void) { return p[unplugged] ? fail(COM) : p[opened] ? 0 : fail(NO_DEVICE); }
 /* Faults of the function of this name. */
 static int is_to_fail(const char *function) {
@@ -204,7 +205,8 @@ static void delay(const char *function) {
 }
 static int begin_of(const char *function) {
   start(), delay(function), lock(), catch_up();
-  return is_to_fail(function) ? -1 : answer();
+  int code = is_to_fail(function);
+  return code ? code : answer();
 }
 #define begin() begin_of(__func__)
 static int end(int code) { unlock(); return code; }
@@ -296,7 +298,7 @@ EXPORT int dhdStop(char id) {
 }
 EXPORT int dhdGetSystemType(char id) { (void)id; int code = begin(); return end(code ? code : (int)p[type]); }
 EXPORT const char *dhdGetSystemName(char id) { (void)id; return p[type] == 33 ? "omega.3" : "another device"; }
-EXPORT int dhdGetSerialNumber(unsigned short *serial, char id) { (void)id; PLAIN(*serial = 4242); }
+EXPORT int dhdGetSerialNumber(unsigned short *serial, char id) { (void)id; PLAIN(if (p[serial_told]) *serial = (unsigned short)p[serial_no]); }
 EXPORT int dhdGetVersion(double *version, char id) { (void)id; PLAIN(*version = p[firmware]); }
 EXPORT int dhdGetStatus(int *status, char id) {
   (void)id;
@@ -350,7 +352,7 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
     if (asked * share > p[silently_n]) share = p[silently_n] / asked;
     if (p[turned]) share = -share;
     share *= p[silent_gain];
-    command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
+    if (asked > 0 || !p[keeps_force]) command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
     p[writes]++, p[last_write] = asked, last_command_s = p[now];
     if (asked > 0) device->used = 1;
     if (!p[latches] && !p[force_on] && p[cause] == 3) p[force_on] = 1, p[brake] = 0, p[cause] = 0;

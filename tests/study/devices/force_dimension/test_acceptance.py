@@ -76,6 +76,17 @@ def test_a_firmware_that_is_no_version_opens_for_no_hand_and_is_not_accepted(stu
     assert found.wrong and f"gives {firmware:g} as the version" in found.value
 
 
+def test_a_serial_number_that_is_not_told_opens_for_no_hand_and_is_not_accepted(stub, vendor, rigs):
+    stub.set("serial_told", 0)
+    for details in ("serial 0, firmware 2.41, SDK 3.17.5.0", "serial 65535, firmware 2.41, SDK 3.17.5.0"):
+        vendor.accept("omega.3", details=details)
+        with pytest.raises(DeviceError, match="does not say its serial number"):
+            open_for_a_hand(rigs)
+    with pytest.raises(DeviceError, match="does not say its serial number"):
+        accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
+    assert stub.safe
+
+
 def test_an_acceptance_expires_and_must_not_be_dated_in_the_future(stub, vendor, rigs):
     today = datetime.now(UTC).date()
     vendor.accept("omega.3", on=(today - VALID_FOR).isoformat())

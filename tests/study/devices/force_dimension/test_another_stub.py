@@ -178,8 +178,10 @@ def test_a_device_without_power_or_calibration_ends_the_force_although_it_says_f
     assert why in said
 
 
+@pytest.mark.parametrize("code", [-1, -2, -2147483647])
 @pytest.mark.parametrize("function", ["dhdGetPosition", "dhdSetForce", "dhdGetStatus", "dhdGetButtonMask"])
-def test_a_single_error_of_a_call_of_the_loop_ends_the_trial_with_its_words(stepped_stub, rigs, function):
+def test_a_single_error_of_a_call_of_the_loop_ends_the_trial_with_its_words(stepped_stub, rigs, function, code):
+    stepped_stub.set("answer_of_errors", code)
     fault, said = lost_words(stepped_stub, rigs, lambda stub: stub.fail(function, 7, 1))
     assert fault is Fault.LOST
     assert f"{function}: timeout (error 7)" in said
@@ -246,3 +248,36 @@ def test_a_call_that_hangs_while_it_is_closed_leaves_no_force_and_is_said(stub, 
         time.sleep(0.05)
     assert stub.safe
     assert np.isfinite(stub.get("peak_n")) and stub.get("peak_n") <= rigs.LIMITS.total_cap_n
+
+
+@pytest.mark.real_time
+def test_a_device_that_keeps_its_force_at_zero_is_braked_while_nothing_is_played(stub, rigs):
+    """An emergency stop, whose zero is answered and not given: neither an error nor the watchdog would tell."""
+    stub.set("stiffness", 150)
+    stub.set("stretch_in_use", 1000)
+    with contextlib.closing(SafeDevice(stub.rig(rests=True), rigs.SETTINGS, RealClock())) as device:
+        device.hold(rigs.push(1.0))
+        for _ in range(8):
+            time.sleep(0.02)
+            device.keep_alive()
+        stub.set("keeps_force", 1)
+        device.stop()
+        until_s = time.monotonic() + 10.0
+        while not stub.safe and time.monotonic() < until_s:
+            time.sleep(0.005)
+        assert stub.safe
+        with pytest.raises(DeviceError, match="Emergency|emergency|another force than it was sent"):
+            device.hold(rigs.push(1.0))
+        time.sleep(0.1)
+        assert stub.safe
+
+
+@pytest.mark.parametrize("devices", [1e6, 2e9])
+def test_a_library_that_has_lost_count_of_its_devices_is_asked_for_few(stub, rigs, devices):
+    stub.set("devices", devices)
+    stub.set("type", 63)
+    began_s = time.monotonic()
+    with pytest.raises(DeviceError, match="Found instead: delta3") as refused:
+        open_device("omega3", rigs.SETTINGS, RealClock(), 1, own_process=False)
+    assert time.monotonic() - began_s < 5.0
+    assert len(str(refused.value)) < 1000
