@@ -3,6 +3,7 @@ device moves."""
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from protocols.definition.apparatus import Plane
 from protocols.definition.exposure import GateSettings
@@ -12,7 +13,7 @@ from study.session.facts.events import AnswerGiven, OnsetPulsed
 from study.session.state.due_trial import Present, labels_are_swapped
 from study.session.state.progress import progress
 from study.session.state.state import SessionState, repeats_left
-from study.session.stimulus.delivered import measure_delivered
+from study.session.stimulus.delivered import hardly_arrived, measure_delivered
 from study.session.stimulus.stimulus import AXES, direction_vector
 from study.session.views.views import HandleView, Question, Task, Unanswered, picture_of
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
@@ -21,6 +22,8 @@ from study.workflows.trial.judge_trial import cause_of, judge
 from study.workflows.trial.masking import was_masked
 from study.workflows.trial.sitting import Pulse, Sitting, record, release_device
 from study.workflows.trial.trial_facts import Outcome, answer_health, trial_measured, trial_presented, trial_spoiled
+
+HARDLY_ARRIVED = "less motion arrived than any hand leaves: motors, a blocked handle or the accelerometer"
 
 NOT_MASKED = Unanswered("the masking noise stopped during the trial", leave=False)
 
@@ -150,6 +153,10 @@ def _close(state: SessionState, present: Present, played: Played, asked: Stimulu
     if verdict.spoiled:
         state = record(state, trial_spoiled(present, (verdict.spoiled, verdict.cause), played.health, sitting), sitting)
         return AfterTrial(state, leave=leave, void=verdict.spoiled, fault=fault)
+    friction_n = state.protocol.safety.plausibility.friction_n
+    measured = recording if values is not None else None
+    if measured is not None and hardly_arrived(measured, vector, present.frequency_hz, friction_n):
+        verdict = replace(verdict, flags=(*verdict.flags, HARDLY_ARRIVED))
     outcome = Outcome(played, values, verdict.flags, vector, verdict.measured)
     state = record(state, trial_measured(present, outcome, state, sitting), sitting)
     return AfterTrial(state, correct, leave=leave, fault=fault)
