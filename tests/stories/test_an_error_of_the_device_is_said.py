@@ -11,6 +11,7 @@ pytestmark = pytest.mark.real_time
 OF_THE_DRIVER = {
     "motors": ({"scaled_from_n": 0.1}, "Its motors cannot give the force that is asked for"),
     "silent cap": ({"silently_n": 0.1}, "It says that it gives another force than it was sent"),
+    "silent gain": ({"silent_gain": 0.65}, "It says that it gives another force than it was sent"),
     "speed": ({"off_by": 2}, "moved faster than the device allows"),
     "power": ({"powered": 0}, "its power supply is off"),
     "reading": ({"read_fails": 2}, "dhdGetPosition: communication error"),
