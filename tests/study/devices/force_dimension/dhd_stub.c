@@ -27,7 +27,7 @@
   X(devices, 1) X(type, 33) X(sdk_minor, 17) X(firmware, 2.41) X(serial_told, 1) X(serial_no, 4242) X(in_use, 0) X(open_fails, 0) X(calibrated, 1) X(powered, 1)              \
   X(wall_time, 1) X(mass, 0.25) X(damping, 2) X(stiffness, 0) X(weight, 0) X(max_n, 12)                                \
   X(watchdog_works, 1) X(watchdog_settable, 1) X(watchdog_stretch, 1) X(latches, 1) X(force_enables, 1)                \
-  X(unplugged, 0) X(unwritten, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
+  X(unplugged, 0) X(unwritten, 0) X(untold, 0) /* position; status and force: answered and never written */ X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
   X(late_every, 0) X(late_s, 0) X(write_fails, 0) X(read_fails, 0) X(stop_fails, 0) X(buttons, 0)                      \
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
@@ -302,6 +302,7 @@ EXPORT int dhdGetSerialNumber(unsigned short *serial, char id) { (void)id; PLAIN
 EXPORT int dhdGetVersion(double *version, char id) { (void)id; PLAIN(*version = p[firmware]); }
 EXPORT int dhdGetStatus(int *status, char id) {
   (void)id;
+  if (p[untold] == 1) PLAIN((void)0);
   PLAIN(memset(status, 0, 17 * sizeof(int)); status[0] = p[powered] != 0; status[1] = status[2] = 1;
         status[3] = p[calibrated] != 0; status[4] = !p[force_on] && !p[brake]; status[5] = p[force_on] != 0;
         status[6] = p[brake] != 0; status[10] = p[gravity] != 0; status[11] = p[guard] != 0;
@@ -366,6 +367,7 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
 EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
   (void)id;
   double *told[3] = {x_n, y_n, z_n}, step = p[told_step];
+  if (p[untold] > 1) PLAIN((void)0);
   PLAIN(for (int i = 0; i < 3; i++) {
     double said = p[gain_told] * p[fx + i] + p[told_noise] * 3.4641016 * evenly();
     *told[i] = step > 0 ? step * round(said / step) : said;

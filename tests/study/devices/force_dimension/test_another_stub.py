@@ -156,6 +156,16 @@ def test_a_position_that_is_reported_as_read_and_never_written_is_no_position(st
     assert fault is Fault.NOT_A_NUMBER
 
 
+@pytest.mark.parametrize(
+    ("untold", "why"), [(1, "its power supply is off"), (2, "it gives another force than it was sent")]
+)
+def test_a_status_or_force_that_is_reported_as_read_and_never_written_ends_the_trial(stepped_stub, rigs, untold, why):
+    """What an earlier call wrote there must not stand for it."""
+    fault, said = lost_words(stepped_stub, rigs, lambda stub: stub.set("untold", untold))
+    assert fault is Fault.LOST
+    assert why in said
+
+
 NO_CAUSE = 0.5
 """Of the stub's `off_by`: the force goes off, and the status has no cause for it."""
 
