@@ -10,6 +10,7 @@ from protocols.definition.exposure import GateSettings
 from protocols.trial import Phase, VoidCause
 from study.devices.device import Fault, Played
 from study.session.facts.events import AnswerGiven, OnsetPulsed
+from study.session.facts.void_reasons import HARDLY_ARRIVED
 from study.session.state.due_trial import Present, labels_are_swapped
 from study.session.state.progress import progress
 from study.session.state.state import SessionState, repeats_left
@@ -22,8 +23,6 @@ from study.workflows.trial.judge_trial import cause_of, judge
 from study.workflows.trial.masking import was_masked
 from study.workflows.trial.sitting import Pulse, Sitting, record, release_device
 from study.workflows.trial.trial_facts import Outcome, answer_health, trial_measured, trial_presented, trial_spoiled
-
-HARDLY_ARRIVED = "less motion arrived than any hand leaves: motors, a blocked handle or the accelerometer"
 
 NOT_MASKED = Unanswered("the masking noise stopped during the trial", leave=False)
 

@@ -9,13 +9,12 @@ from protocols.trial import TrialStatus, VoidCause
 from study.devices.device import Fault, Health
 from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
-from study.session.facts.void_reasons import computer_too_busy
+from study.session.facts.void_reasons import HARDLY_ARRIVED, computer_too_busy
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import read_log
 from study.tui.trial_words import void_words
 from study.workflows.session import conduct_session
 from study.workflows.trial.judge_trial import judge
-from study.workflows.trial.present_trial import HARDLY_ARRIVED
 
 GOOD = SensorFacts(packets=9900, lost=100, spoiled_bytes=1500, restarts=0, ticks=1000, unplaced_ticks=0, drift_ppm=31.5)
 BAD = replace(GOOD, packets=9000, lost=1000)
