@@ -64,7 +64,7 @@ class Stub:
         self._library.stub_advance.argtypes = [ctypes.c_double]
         self._library.stub_move.argtypes = [ctypes.c_double] * 3
         self._library.stub_fail.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.c_double]
-        self._library.stub_delay.argtypes = [ctypes.c_char_p, ctypes.c_double]
+        self._library.stub_delay.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.c_double]
 
     def set(self, name: str, value: float) -> None:
         self._library.stub_set(name.encode(), value)
@@ -82,9 +82,9 @@ class Stub:
         """The next calls of this function of the vendor's answer an error. The last function that was named counts."""
         self._library.stub_fail(function.encode(), code, times)
 
-    def delay(self, function: str, seconds: float) -> None:
-        """Each call of it takes so long."""
-        self._library.stub_delay(function.encode(), seconds)
+    def delay(self, function: str, seconds: float, times: float = math.inf) -> None:
+        """The next calls of it take so long."""
+        self._library.stub_delay(function.encode(), seconds, times)
 
     def advance(self, seconds: float) -> None:
         self._library.stub_advance(seconds)

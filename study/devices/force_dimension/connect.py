@@ -14,6 +14,9 @@ WATCHDOG_S = 0.03
 """Close to the 31.9 ms that the firmware can count: a loop in Python is late by 10 ms on a busy computer, and a force
 that stays for 30 ms moves a bare handle by a few millimetres."""
 
+MOST_DEVICES = 16
+"""Devices that are looked at on one computer. A library that counts more than that has lost count."""
+
 CALIBRATE = (
     "Push the handle gently into its calibration position, as the device's manual shows (or run the vendor's "
     "calibration program), then try again."
@@ -33,7 +36,7 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
     """The first device of this kind that is free, as it is: neither armed nor taking forces. Raises `DeviceError`."""
     others: list[tuple[str, str | None]] = []
     failures: list[LibraryError] = []
-    for number in range(max(0, int(library.function("dhdGetDeviceCount")()))):
+    for number in range(min(MOST_DEVICES, max(0, int(library.function("dhdGetDeviceCount")())))):
         try:
             handle = Handle(library, library.call("dhdOpenID", number))
         except LibraryError as error:

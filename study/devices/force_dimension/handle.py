@@ -1,6 +1,7 @@
 """An opened device: the library's functions bound to its number, with values instead of pointers."""
 
 import contextlib
+import math
 from ctypes import byref, c_double, c_int, c_ubyte, c_ushort
 from dataclasses import dataclass
 
@@ -13,6 +14,9 @@ give that force and gives less of it, in the same direction."""
 WATCHDOG_UNIT_S = 125e-6
 STATUS_SIZE = 32
 """17 in SDK 3.17.5; room for more, since a library writes as many as it knows."""
+
+NO_SERIAL = 0xFFFF
+"""No device's serial number."""
 
 POWERED_PLACE, CALIBRATED_PLACE, FORCE_ON_PLACE, OFF_CAUSE_PLACE = 0, 3, 5, 14
 """Indices in the library's status array."""
@@ -106,12 +110,14 @@ class Handle:
         return (self.library.function("dhdGetSystemName")(self.number) or b"unnamed").decode("utf-8", "replace")
 
     def serial(self) -> int:
-        number = c_ushort()
+        """`NO_SERIAL` where the library answers and says none."""
+        number = c_ushort(NO_SERIAL)
         self.library.call("dhdGetSerialNumber", byref(number), self.number)
         return number.value
 
     def firmware(self) -> float:
-        version = c_double()
+        """NaN where the library answers and says none."""
+        version = c_double(math.nan)
         self.library.call("dhdGetVersion", byref(version), self.number)
         return version.value
 

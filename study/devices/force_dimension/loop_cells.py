@@ -24,6 +24,14 @@ is stopped."""
 ODD_N, ODD_PART = 0.2, 0.2
 """Difference of the two forces that an acceptance allows: N, and a share of the one that was sent."""
 
+REMEMBERED, LEAST_WEIGHT = 200.0, 20.0
+"""Status checks over which the gain of the reported force is estimated (2 s at 1 kHz; older ones fade out), and how
+many it takes."""
+GAIN_ERRORS = 5.0
+"""Standard errors by which the gain must be further from 1 than `ODD_PART`."""
+FINEST_N = 0.002
+"""Resolution that no report is taken to be finer than (N)."""
+
 POSITION, FORCE, STATUS, BUTTONS, BRAKES, ENABLE, GIVEN, CALLS_SIZE = range(SYSTEM_SIZE, SYSTEM_SIZE + 8)
 """Places of the addresses of the library's functions (`LIBRARY`), after those of `native`."""
 LIBRARY = (
@@ -39,10 +47,17 @@ LIBRARY = (
 device has reported a force."""
 
 TOLD, SENT = 17, 20
-"""First cells of the force that the device reports (x, y, z; N), and of the last `MEMORY` forces sent (x, y; N)."""
+"""First cells of the force that the device reports (x, y, z; N), and of the last `MEMORY` forces sent (the same)."""
 MEMORY = 3
 """Forces sent that are remembered, for the comparison with the reported force."""
-CELLS_SIZE = SENT + 2 * MEMORY
+WEIGHT = SENT + 3 * MEMORY
+"""Cells of the sums for the gain: number, reported force (x, y, z), its square; from LAGGED on, for each age of the
+report in ticks: sent force (x, y, z), its square, its product with the reported one."""
+LAGGED, OF_LAG = WEIGHT + 5, 5
+STILL_TOLD = LAGGED + OF_LAG * MEMORY
+STILL_ODD = STILL_TOLD + 3
+"""Force that the device reports after a zero (x, y, z; N), and how often in a row it was one."""
+CELLS_SIZE = STILL_ODD + 1
 
 OF_LIBRARY = 1
 """Error code of a failed call of the first function of LIBRARY; the codes of the others follow."""
@@ -101,11 +116,11 @@ def check_on(calls: Addresses, cells: FloatArray) -> int:
 
 
 @part
-def note_sent(cells: FloatArray, x: float, y: float) -> None:
-    """Keep the horizontal part of a force that was sent, as the newest of `MEMORY`."""
-    for place in range(SENT + 2 * MEMORY - 1, SENT + 1, -1):
-        cells[place] = cells[place - 2]
-    cells[SENT], cells[SENT + 1] = x, y
+def note_sent(cells: FloatArray, x: float, y: float, z: float) -> None:
+    """Keep a force that was sent, as the newest of `MEMORY`."""
+    for place in range(SENT + 3 * MEMORY - 1, SENT + 2, -1):
+        cells[place] = cells[place - 3]
+    cells[SENT], cells[SENT + 1], cells[SENT + 2] = x, y, z
 
 
 @part
@@ -113,9 +128,58 @@ def _gives_another(cells: FloatArray) -> bool:
     """Whether the reported force is far from each of the last forces sent: the report may be a tick or two old. Only
     the horizontal part: the vertical one may hold up the device's own weight."""
     for k in range(MEMORY):
-        x, y = cells[SENT + 2 * k], cells[SENT + 2 * k + 1]
+        x, y = cells[SENT + 3 * k], cells[SENT + 3 * k + 1]
         apart = math.hypot(cells[TOLD] - x, cells[TOLD + 1] - y)
         if apart <= ODD_N + ODD_PART * math.hypot(x, y):
+            return False
+    return True
+
+
+@part
+def _add_to_sums(cells: FloatArray) -> None:
+    """Add the newest status check to the sums for the gain; those before lose weight."""
+    for place in range(WEIGHT, STILL_TOLD):
+        cells[place] *= 1.0 - 1.0 / REMEMBERED
+    cells[WEIGHT] += 1.0
+    for i in range(3):
+        told = cells[TOLD + i]
+        cells[WEIGHT + 1 + i] += told
+        cells[WEIGHT + 4] += told * told
+        for k in range(MEMORY):
+            sent, sums = cells[SENT + 3 * k + i], LAGGED + OF_LAG * k
+            cells[sums + i] += sent
+            cells[sums + 3] += sent * sent
+            cells[sums + 4] += sent * told
+
+
+@part
+def _fit_gain(cells: FloatArray, age: int) -> tuple[float, float, float]:
+    """Linear regression of the reported on the sent force, with a constant (the weight that is held up), for a report
+    that is so many ticks old: gain, squared residuals (N²), squared variation of the force sent (N²)."""
+    n, sums = cells[WEIGHT], LAGGED + OF_LAG * age
+    told2, sent2, product = cells[WEIGHT + 4], cells[sums + 3], cells[sums + 4]
+    for i in range(3):
+        told, sent = cells[WEIGHT + 1 + i], cells[sums + i]
+        told2, sent2, product = told2 - told * told / n, sent2 - sent * sent / n, product - sent * told / n
+    gain = product / max(sent2, 1e-12)
+    return gain, max(0.0, told2 - gain * product) + 3.0 * n * FINEST_N * FINEST_N, sent2
+
+
+@part
+def _gain_is_off(cells: FloatArray) -> bool:
+    """Whether the reported force is another multiple of the force sent, for each age of the report that is as likely as
+    the best (likelihood ratio). Forces that vary by less than `ODD_N` are not judged."""
+    n, best = cells[WEIGHT], math.inf
+    if n < LEAST_WEIGHT:
+        return False
+    for age in range(MEMORY):
+        best = min(best, _fit_gain(cells, age)[1])
+    for age in range(MEMORY):
+        gain, residual, sent2 = _fit_gain(cells, age)
+        if 3.0 * n * math.log(residual / best) > GAIN_ERRORS * GAIN_ERRORS:
+            continue
+        error = math.sqrt(residual / (3.0 * n * max(sent2, 1e-12)))
+        if not (2.0 * sent2 > ODD_N * ODD_N * n and abs(gain - 1.0) > ODD_PART + GAIN_ERRORS * error):
             return False
     return True
 
@@ -130,16 +194,31 @@ def _check_given(calls: Addresses, cells: FloatArray) -> int:
         return 0
     if cells[TOLD] != 0.0 or cells[TOLD + 1] != 0.0:
         cells[TELLS] = 1.0
-    cells[ODD] = count_beyond_share(cells[ODD], cells[TELLS] != 0.0 and _gives_another(cells), ODD_SHARE)
-    return 0 if cells[ODD] < ODD_FOR * (1.0 - ODD_SHARE) else record_failure(cells, GIVES_ANOTHER)
+    if cells[TELLS] == 0.0:
+        return 0
+    _add_to_sums(cells)
+    cells[ODD] = count_beyond_share(cells[ODD], _gives_another(cells), ODD_SHARE)
+    odd = cells[ODD] >= ODD_FOR * (1.0 - ODD_SHARE) or _gain_is_off(cells)
+    return record_failure(cells, GIVES_ANOTHER) if odd else 0
 
 
 @part
 def look(calls: Addresses, cells: FloatArray) -> int:
     """Read buttons, status and the reported force. Returns 0 or an error code."""
     pressed = call_int(calls[BUTTONS], (np.int32(cells[NUMBER]),))
-    if pressed == -1:  # no device has 32 buttons
+    if pressed < 0:  # no device has 32 buttons
         return record_library_failure(cells, BUTTONS)
     cells[PRESSED] = pressed & 0xFFFFFFFF
     code = max(0, check_on(calls, cells))
     return code if code != 0 else _check_given(calls, cells)
+
+
+@part
+def check_still(calls: Addresses, cells: FloatArray) -> int:
+    """After a zero that was sent while nothing is played: 0, or an error code where the device says that it gives a
+    force all the same, again and again."""
+    place = cells.ctypes.data + 8 * STILL_TOLD
+    asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
+    told = call_int(calls[GIVEN], asked) >= 0 and math.hypot(cells[STILL_TOLD], cells[STILL_TOLD + 1]) > ODD_N
+    cells[STILL_ODD] = cells[STILL_ODD] + 1.0 if told else 0.0
+    return 0 if cells[STILL_ODD] < ODD_FOR else record_failure(cells, GIVES_ANOTHER)

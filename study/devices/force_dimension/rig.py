@@ -26,6 +26,9 @@ from study.errors import DeviceError
 REST_SHARE = 0.25
 """Share of the watchdog's time between two zeros while nothing is played."""
 
+JOIN_S = 0.5
+"""Longest wait for the thread of these zeros to end (s): half of what a caller waits for a device to close."""
+
 
 class Accelerometer(Protocol):
     """A sensor at the handle, read by a thread of its own."""
@@ -73,8 +76,9 @@ class ForceDimensionRig:
         self._overlaid = accelerometer if shared is None else None
         self._failure: DeviceError | None = None
         self._closed = threading.Event()
+        self._resting = threading.Thread(target=self._repeat_zero_force, name="gravity compensation", daemon=True)
         if rests and drops_force_after_s > 0:
-            threading.Thread(target=self._repeat_zero_force, name="gravity compensation", daemon=True).start()
+            self._resting.start()
 
     @property
     def halves(self) -> CompiledIo | None:
@@ -149,7 +153,17 @@ class ForceDimensionRig:
                 self._sending.release()
             if self._accelerometer is not None:
                 self._accelerometer.close()
+        self._end_resting()
         return bool(self._cells[loop_cells.LET_GO])
+
+    def _end_resting(self) -> None:
+        """Wait for the thread of the zeros, once force and brakes are done with: a call that hangs there holds up
+        neither. What it still did is taken back where the device would not disconnect."""
+        if self._resting.ident is None or self._resting is threading.current_thread():
+            return
+        self._resting.join(JOIN_S)
+        if not self._handle.let_go():
+            self._cells[loop_cells.LET_GO] = 0.0
 
     def _repeat_zero_force(self) -> None:
         """Repeat a zero force. Never sends one between two forces, nor anything after a failure. As the loop, before

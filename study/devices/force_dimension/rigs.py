@@ -1,5 +1,6 @@
 """Builds the rig of a named device: library, device, watchdog and its test, gravity compensation."""
 
+import math
 import time
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -8,12 +9,13 @@ from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.force_dimension.acceptance import check_accepted
 from study.devices.force_dimension.connect import device_error, load_library, make_ready, open_model
-from study.devices.force_dimension.handle import Handle
+from study.devices.force_dimension.handle import NO_SERIAL, Handle
 from study.devices.force_dimension.lab import LabSettings, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rig import ForceDimensionRig
 from study.devices.force_dimension.watchdog_check import check_watchdog
+from study.errors import DeviceError
 
 RATE_HZ = 1000.0
 """Rate of the loop (Hz)."""
@@ -59,12 +61,26 @@ def _rig(
 
 
 def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
-    """Facts about an open device. Raises `LibraryError`."""
+    """Facts about an open device. Raises `LibraryError`, and `DeviceError` where its firmware or serial number is not
+    known: an acceptance that is void for another would then hold for every one."""
+    firmware, serial = handle.firmware(), handle.serial()
+    if not 0 < firmware < math.inf:
+        raise _unknown_error(model, "firmware", f"gives {firmware:g} as the version")
+    if serial == NO_SERIAL:
+        raise _unknown_error(model, "serial number", "answers and gives none")
     return DeviceInfo(
         name=model.name,
         simulated=False,
         sample_rate_hz=RATE_HZ,
         max_force_n=model.max_force_n,
         effective_mass_kg=effective_mass_kg or model.effective_mass_kg,
-        details=f"serial {handle.serial()}, firmware {handle.firmware():g}, SDK {library.version_text}",
+        details=f"serial {serial}, firmware {firmware:g}, SDK {library.version_text}",
+    )
+
+
+def _unknown_error(model: DeviceModel, what: str, said: str) -> DeviceError:
+    return DeviceError(
+        f"The {model.name} does not say its {what}",
+        f"Its library {said}, so no acceptance can be known to hold for it. Nothing has moved.",
+        "Switch the device off and on, then try again; else install the vendor's newest SDK or firmware.",
     )

@@ -42,6 +42,7 @@ from study.devices.force_dimension.loop_cells import (
     WEAK,
     WITHHELD_UNTIL_S,
     check_on,
+    check_still,
     count_beyond_share,
     look,
     note_sent,
@@ -53,8 +54,9 @@ from study.devices.governor.govern import VECTOR
 from study.devices.native import Addresses, acquire, call_int, now_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
 
-LOOK_EVERY = 10
-"""Ticks between two readings of status and buttons (100 Hz at 1 kHz: a person cannot press faster)."""
+LOOKS_OF, LOOKS_AT = 42.0, (0.0, 8.0, 18.0, 29.0)
+"""Of so many ticks those at which status, buttons and the reported force are read (95 Hz at 1 kHz: a person cannot
+press faster). Uneven, so that no stimulus is looked at in the same two phases of its period again and again."""
 
 STALE_FOR, STALE_SHARE = 50, 0.5
 """Readings that only repeat an earlier one: so many in a row, or as many beyond this share of all readings, end the
@@ -100,7 +102,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     answer = call_int(calls[POSITION], asked)
     if answer < 0:
         return record_library_failure(cells, POSITION)
-    if cells[READS] % LOOK_EVERY == 0.0:
+    if cells[READS] % LOOKS_OF in LOOKS_AT:
         code = look(calls, cells)
         if code != 0:
             return code
@@ -132,12 +134,25 @@ def _wake_device(calls: Addresses, cells: FloatArray) -> int:
     code = check_on(calls, cells)
     if code >= 0:
         return code
+    if cells[CLOSED] != 0.0:
+        return record_failure(cells, IS_CLOSED)
     number = np.int32(cells[NUMBER])
     if call_int(calls[BRAKES], (np.int32(0), number)) < 0:
         return record_library_failure(cells, BRAKES)
-    if call_int(calls[ENABLE], (np.int32(1), number)) < 0:
+    if cells[CLOSED] == 0.0 and call_int(calls[ENABLE], (np.int32(1), number)) < 0:
         return record_library_failure(cells, ENABLE)
+    if cells[CLOSED] != 0.0:  # the call hung while the device was closed: it is taken back
+        _brake(calls, cells)
+        return record_failure(cells, IS_CLOSED)
     return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else record_library_failure(cells, FORCE)
+
+
+@part
+def _brake(calls: Addresses, cells: FloatArray) -> None:
+    """Forces off and brakes on. Whether the device takes that is not asked."""
+    number = np.int32(cells[NUMBER])
+    call_int(calls[ENABLE], (np.int32(0), number))
+    call_int(calls[BRAKES], (np.int32(1), number))
 
 
 @part
@@ -153,7 +168,7 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     if answer < 0:
         return record_library_failure(cells, FORCE)
     cells[SENT_S] = began_s
-    note_sent(cells, x, y)
+    note_sent(cells, x, y, z)
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
     cells[TOO_STRONG] = count_beyond_share(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
     if cells[TOO_STRONG] >= SCALED_FOR * (1.0 - SCALED_SHARE):
@@ -171,7 +186,7 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
         code = check_on(calls, cells)
         if code != 0 and code != RELEASED:
             return code
-    note_sent(cells, 0.0, 0.0)
+    note_sent(cells, 0.0, 0.0, 0.0)
     cells[SENT_ZERO], cells[TOO_STRONG] = 1.0, 0.0
     if not _is_silent(calls, cells):
         cells[SENT_S] = began_s
@@ -213,14 +228,18 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 @part
 def _rest(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
-    """Repeat a zero where nothing is played. The lock is never kept while the interpreter is waited for: the loop's
-    next force waits no longer than `LOCK_S` for it."""
+    """Repeat a zero where nothing is played, and brake where the device does not take it. The lock is never kept while
+    the interpreter is waited for: the loop's next force waits no longer than `LOCK_S` for it."""
     if not acquire(calls, LOCK_S):
         return 0
     code = 0
     resting = cells[SENT_ZERO] != 0.0 and now_s(calls) - cells[SENT_S] >= every_s
     if resting and cells[CLOSED] == 0.0 and cells[FAILED] == 0.0:
         code = _send_force(calls, cells, force)
+        if code == 0:
+            code = check_still(calls, cells)
+            if code != 0:
+                _brake(calls, cells)
     release(calls)
     return code
 

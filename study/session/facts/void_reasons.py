@@ -12,6 +12,9 @@ TICK_HELD = "late was the latest 1 kHz tick"
 ACCELERATION_MISSING = "of the acceleration is missing"
 """End of the reason, after the figure: packets of the accelerometer were lost, torn or garbled."""
 
+HARDLY_ARRIVED = "less motion arrived than any hand leaves of the force"
+"""Remark on a trial that counts: motors that do nothing, a blocked handle, or a dead accelerometer."""
+
 LOAD_PER_PROCESSOR = 0.75
 """Load average per processor above which tasks often have to wait for a processor."""
 

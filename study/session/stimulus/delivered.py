@@ -12,6 +12,13 @@ from equalizer.signals.signal import FloatArray
 HIGHEST_HARMONIC = 5
 """Highest harmonic, as for acceleration ellipses: a mechanism transmits little beyond it."""
 
+STIFFEST_N_PER_M, STRONGEST_DAMPING_N_S_PER_M, HEAVIEST_KG = 2000.0, 30.0, 3.0
+"""Assumed upper limits of handle and hand together: more than four times a whole arm (135 N/m, 6.5 N s/m, 0.55 kg by
+Sci. Rep. srep18004)."""
+
+LEAST_MPS2 = 0.1
+"""Where even less may arrive, a sensor's noise could hide it: nothing is said then."""
+
 
 @dataclass(frozen=True, slots=True)
 class Delivered:
@@ -41,6 +48,18 @@ def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_h
         displacement_mm=1000.0 * float(np.abs(along)) / (2 * np.pi * frequency_hz) ** 2,
         harmonics_mps2=_harmonics(recording, frequency_hz),
     )
+
+
+def hardly_arrived(recording: Recording, unit_vector: FloatArray, frequency_hz: float, friction_n: float) -> bool:
+    """Whether the acceleration along the direction is less than the stiffest, heaviest hand leaves of the force sent:
+    motors that do nothing, a blocked handle, a dead sensor. friction_n: force that may move nothing. Both are fitted at
+    the stimulus frequency; the recording has at least one period, as for `measure_delivered`."""
+    rate_hz, w = recording.sample_rate_hz, 2 * math.pi * frequency_hz
+    force_n = abs(phasors(recording.command.samples, rate_hz, frequency_hz)[0] @ unit_vector)
+    along_mps2 = abs(phasors(recording.response.samples, rate_hz, frequency_hz)[0] @ unit_vector)
+    opposed = STIFFEST_N_PER_M + STRONGEST_DAMPING_N_S_PER_M * w + HEAVIEST_KG * w**2
+    least_mps2 = (force_n - friction_n) * w**2 / opposed
+    return bool(least_mps2 >= LEAST_MPS2 and along_mps2 < least_mps2)
 
 
 def _harmonics(recording: Recording, frequency_hz: float) -> float | None:

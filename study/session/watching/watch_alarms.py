@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.facts.log_time import Moment, elapsed_s, seconds_between
-from study.session.facts.void_reasons import computer_too_busy
+from study.session.facts.void_reasons import HARDLY_ARRIVED, computer_too_busy
 from study.session.watching.followed_session import FollowedSession
 from study.session.watching.live import Live
 from study.session.watching.watch_view import ON, Alarm, DriftLine, Exposure, Standing
@@ -179,6 +179,16 @@ def _load_alarm(now: Situation) -> Alarm | None:
     return Alarm("busy", f"The computer is too busy: {many}. Close other programs.", now.watched.last_utc)
 
 
+def _still_alarm(now: Situation) -> Alarm | None:
+    remarks = now.watched.remarks[-PRESENTATIONS:]
+    still = sum(HARDLY_ARRIVED in remark for remark in remarks)
+    if not still:
+        return None
+    many = f"In {still} of the last {len(remarks)} presentations {HARDLY_ARRIVED}"
+    look = "Pause, and look at motors, handle and accelerometer."
+    return Alarm("still", f"{many}. {look}", now.watched.last_utc)
+
+
 def _drift_alarm(now: Situation) -> Alarm | None:
     beyond = [drift.sentence for drift in now.drifts if drift.beyond]
     if not beyond:
@@ -206,5 +216,5 @@ _ENDS = ("gone", "ended")
 _OVER: tuple[Callable[[Situation], Alarm | None], ...] = (_log_alarm, _gone_alarm, _end_alarm)
 _RUNNING: tuple[Callable[[Situation], Alarm | None], ...] = (
     _device_alarm, _silence_alarm, _log_alarm, _adverse_alarm, _handle_alarm, _sensor_alarm, _dose_alarm,
-    _time_alarm, _lapse_alarm, _drift_alarm, _load_alarm, _void_alarm, _answer_alarm,
+    _time_alarm, _still_alarm, _lapse_alarm, _drift_alarm, _load_alarm, _void_alarm, _answer_alarm,
 )  # fmt: skip

@@ -201,7 +201,7 @@ def _refusal(name: str, problems: tuple[str, ...]) -> DeviceError:
     return DeviceError(
         TITLE,
         f"What {name} says of its linkage cannot be: {'; '.join(problems[:SHOWN])}{more}.",
-        "Calibrate its handle anew (`hapteq doctor --device NAME --calibrate`), try a smaller grid (--radius, --depth) "
-        "and the vendor's newest SDK; if it says the same then, do without: no other command needs it.",
+        f"Calibrate its handle anew (`hapteq doctor --device {name} --calibrate`), try a smaller grid (--radius, "
+        "--depth) and the vendor's newest SDK; if it says the same then, do without: no other command needs it.",
         saved=SAVED,
     )

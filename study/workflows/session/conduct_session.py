@@ -58,6 +58,8 @@ class ConductedSitting:
     """How a sitting ended: the session's state, and why it was left."""
 
     folder: SessionFolder
+    device_name: str
+    """As `open_device` takes it."""
     state: SessionState
     left: str
     """Why the sitting ended before the session was finished; empty if it is finished."""
@@ -81,7 +83,7 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
         _check_sensor(plan.protocol, device.info)
         equalized = equalize_stimuli(plan.protocol, plan.model, device.info)
         with open_session(plan, device.info, equalized, participant.clock) as opened:
-            return _run(opened, Equipment(device, equalized, pulse, sound), participant)
+            return _run(opened, Equipment(device_name, device, equalized, pulse, sound), participant)
 
 
 def conduct_resumed(folder: SessionFolder, device_name: str, participant: Participant) -> ConductedSitting:
@@ -99,7 +101,7 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
         equalized = reload_equalizer(folder, state, device.info)
         with resume_session(folder, device.info, participant.clock) as opened:
             known_steps = len(state.sitting.clock_steps)
-            return _run(opened, Equipment(device, equalized, pulse, sound), participant, known_steps)
+            return _run(opened, Equipment(device_name, device, equalized, pulse, sound), participant, known_steps)
 
 
 def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
@@ -127,6 +129,8 @@ def _pulses(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
 class Equipment:
     """The device of a sitting, what equalizes its stimuli, the pulse line, and the masking noise."""
 
+    device_name: str
+    """As `open_device` takes it."""
     device: Device
     equalized: Equalized
     pulse: Callable[[], Pulse | None]
@@ -166,4 +170,4 @@ def _run(
     for name in opened.state.sitting.not_counted:
         tell(f"{name} cannot be read: what the hand got in it is not in the vibration dose of today.", sitting)
     end = run_session(opened.state, sitting)
-    return ConductedSitting(folder, end.state, end.left, end.fault, end.why, end.withdrawn)
+    return ConductedSitting(folder, equipment.device_name, end.state, end.left, end.fault, end.why, end.withdrawn)

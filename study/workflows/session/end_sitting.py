@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from study.devices.device import Fault
+from study.devices.opening import SIMULATED
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.void_reasons import TOO_BUSY
 from study.session.views.count_text import answers_are
@@ -17,7 +18,6 @@ from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.session.resume_session import already_finished
 from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
 
-DEVICE_ADVICE = "Run hapteq doctor --device NAME, which says what is wrong with it, and mend that. "
 OF_THE_DEVICE = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
 """Faults that a look at the device may explain."""
 
@@ -55,11 +55,14 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
 
 def _not_finished(end: ConductedSitting) -> StudyError:
     kind = UserInterruptError if end.fault is Fault.NONE else DeviceError
-    advice = DEVICE_ADVICE if end.fault in OF_THE_DEVICE else ""
+    look = f"Run hapteq doctor --device {end.device_name}, which says what is wrong with it, and mend that. "
+    advice = look if end.fault in OF_THE_DEVICE else ""
+    first = BUSY_ADVICE if end.left.startswith(TOO_BUSY) else advice
+    option = "" if end.device_name == SIMULATED else f" --device {end.device_name}"
     return kind(
         "The session is not finished",
         f"The sitting ended: {end.left}.{f' {end.why[0].upper()}{end.why[1:]}.' if end.why else ''}",
-        f"{BUSY_ADVICE if end.left.startswith(TOO_BUSY) else advice}Go on with: hapteq resume {end.folder.path}",
+        f"{first}Go on with: hapteq resume {end.folder.path}{option}",
         saved=f"{answers_are(end.state.answers)} on disk.",
     )
 

@@ -3,16 +3,18 @@ device moves."""
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from protocols.definition.apparatus import Plane
 from protocols.definition.exposure import GateSettings
 from protocols.trial import Phase, VoidCause
 from study.devices.device import Fault, Played
 from study.session.facts.events import AnswerGiven, OnsetPulsed
+from study.session.facts.void_reasons import HARDLY_ARRIVED
 from study.session.state.due_trial import Present, labels_are_swapped
 from study.session.state.progress import progress
 from study.session.state.state import SessionState, repeats_left
-from study.session.stimulus.delivered import measure_delivered
+from study.session.stimulus.delivered import hardly_arrived, measure_delivered
 from study.session.stimulus.stimulus import AXES, direction_vector
 from study.session.views.views import HandleView, Question, Task, Unanswered, picture_of
 from study.workflows.trial.after_trial import AfterTrial, cut_short, reason_to_leave
@@ -150,6 +152,10 @@ def _close(state: SessionState, present: Present, played: Played, asked: Stimulu
     if verdict.spoiled:
         state = record(state, trial_spoiled(present, (verdict.spoiled, verdict.cause), played.health, sitting), sitting)
         return AfterTrial(state, leave=leave, void=verdict.spoiled, fault=fault)
+    friction_n = state.protocol.safety.plausibility.friction_n
+    measured = recording if values is not None else None
+    if measured is not None and hardly_arrived(measured, vector, present.frequency_hz, friction_n):
+        verdict = replace(verdict, flags=(*verdict.flags, HARDLY_ARRIVED))
     outcome = Outcome(played, values, verdict.flags, vector, verdict.measured)
     state = record(state, trial_measured(present, outcome, state, sitting), sitting)
     return AfterTrial(state, correct, leave=leave, fault=fault)

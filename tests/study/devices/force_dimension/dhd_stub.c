@@ -24,14 +24,16 @@
 #endif
 
 #define SWITCHES(X)                                                                                                    \
-  X(devices, 1) X(type, 33) X(sdk_minor, 17) X(in_use, 0) X(open_fails, 0) X(calibrated, 1) X(powered, 1)              \
+  X(devices, 1) X(type, 33) X(sdk_minor, 17) X(firmware, 2.41) X(serial_told, 1) X(serial_no, 4242) X(in_use, 0) X(open_fails, 0) X(calibrated, 1) X(powered, 1)              \
   X(wall_time, 1) X(mass, 0.25) X(damping, 2) X(stiffness, 0) X(weight, 0) X(max_n, 12)                                \
   X(watchdog_works, 1) X(watchdog_settable, 1) X(watchdog_stretch, 1) X(latches, 1) X(force_enables, 1)                \
-  X(unplugged, 0) X(unwritten, 0) X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
+  X(unplugged, 0) X(unwritten, 0) X(untold, 0) /* position; status and force: answered and never written */ X(stale_every, 0) X(frozen, 0) X(jump_m, 0) X(no_number, 0) X(scaled_from_n, 1e9)                    \
   X(late_every, 0) X(late_s, 0) X(write_fails, 0) X(read_fails, 0) X(stop_fails, 0) X(buttons, 0)                      \
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
   X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                   \
+  X(answer_of_errors, -1) /* of functions that fail */ X(keeps_force, 0) /* a zero is answered and not given */                               \
+  X(silent_gain, 1) X(told_step, 0) X(told_noise, 0) /* scaled without a word; the reported force in steps, with noise (rms), N */ \
   X(silently_n, 1e9) /* a cap of its own, of which no answer says anything */ X(turned, 0) /* force the other way */                                                                  \
   /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
   X(friction, 0) X(gain, 1) X(mode_hz, 0) X(mode_kg, 0.02)                                                             \
@@ -51,7 +53,7 @@ typedef struct {
   double values[COUNT], position[3], velocity[3], commanded[3], told[3], swung[3], swinging[3], started, integrated, commanded_at, reset_at;
   double used; /* Since it was opened, a force was sent. */
   char failing[40], late[40]; /* Names of functions: see stub_fail and stub_delay. */
-  double failing_code, failures_left, delay_s;
+  double failing_code, failures_left, delay_s, delays_left;
 } Device;
 static Device own = {.values = {SWITCHES(AS_VALUE)}, .started = -1};
 static Device *device = &own;
@@ -188,7 +190,7 @@ static void come_late(double count, double every, double late) {
   }
 }
 
-static int fail(int code) { last_error = code; return -1; }
+static int fail(int code) { last_error = code; return (int)p[answer_of_errors]; }
 static int answer(void) { return p[unplugged] ? fail(COM) : p[opened] ? 0 : fail(NO_DEVICE); }
 /* Faults of the function of this name. */
 static int is_to_fail(const char *function) {
@@ -197,11 +199,14 @@ static int is_to_fail(const char *function) {
   return fail((int)device->failing_code);
 }
 static void delay(const char *function) {
-  if (!strcmp(function, device->late)) come_late(1, 1, device->delay_s);
+  if (strcmp(function, device->late) || device->delays_left <= 0) return;
+  device->delays_left--;
+  come_late(1, 1, device->delay_s);
 }
 static int begin_of(const char *function) {
   start(), delay(function), lock(), catch_up();
-  return is_to_fail(function) ? -1 : answer();
+  int code = is_to_fail(function);
+  return code ? code : answer();
 }
 #define begin() begin_of(__func__)
 static int end(int code) { unlock(); return code; }
@@ -209,7 +214,7 @@ static int end(int code) { unlock(); return code; }
 
 /* An accelerometer at the handle: newest_sample.py says what stands in its rows. Its clock is `time.monotonic`. */
 static double *samples;
-static unsigned long long drawn;
+static unsigned long long drawn = 88172645463325252ULL;
 static double evenly(void) { /* -0.5 to 0.5; Marsaglia, Xorshift RNGs, 2003 */
   drawn ^= drawn << 13, drawn ^= drawn >> 7, drawn ^= drawn << 17;
   return (double)drawn / 18446744073709551616.0 - 0.5;
@@ -236,17 +241,17 @@ EXPORT void stub_set(const char *name, double value) {
   if (i == frozen) memcpy(shown, x, sizeof x);
   unlock();
 }
-/* The next calls of a function of the vendor's, so many, answer -1 with this error; each of its calls takes so long. */
+/* The next calls of a function of the vendor's, so many, answer -1 with this error; so many of its calls take so long. */
 EXPORT void stub_fail(const char *function, double code, double times) {
   lock(), start();
   strncpy(device->failing, function, sizeof device->failing - 1);
   device->failing_code = code, device->failures_left = times;
   unlock();
 }
-EXPORT void stub_delay(const char *function, double seconds) {
+EXPORT void stub_delay(const char *function, double seconds, double times) {
   lock(), start();
   strncpy(device->late, function, sizeof device->late - 1);
-  device->delay_s = seconds;
+  device->delay_s = seconds, device->delays_left = times;
   unlock();
 }
 EXPORT double stub_get(const char *name) {
@@ -293,10 +298,11 @@ EXPORT int dhdStop(char id) {
 }
 EXPORT int dhdGetSystemType(char id) { (void)id; int code = begin(); return end(code ? code : (int)p[type]); }
 EXPORT const char *dhdGetSystemName(char id) { (void)id; return p[type] == 33 ? "omega.3" : "another device"; }
-EXPORT int dhdGetSerialNumber(unsigned short *serial, char id) { (void)id; PLAIN(*serial = 4242); }
-EXPORT int dhdGetVersion(double *version, char id) { (void)id; PLAIN(*version = 2.41); }
+EXPORT int dhdGetSerialNumber(unsigned short *serial, char id) { (void)id; PLAIN(if (p[serial_told]) *serial = (unsigned short)p[serial_no]); }
+EXPORT int dhdGetVersion(double *version, char id) { (void)id; PLAIN(*version = p[firmware]); }
 EXPORT int dhdGetStatus(int *status, char id) {
   (void)id;
+  if (p[untold] == 1) PLAIN((void)0);
   PLAIN(memset(status, 0, 17 * sizeof(int)); status[0] = p[powered] != 0; status[1] = status[2] = 1;
         status[3] = p[calibrated] != 0; status[4] = !p[force_on] && !p[brake]; status[5] = p[force_on] != 0;
         status[6] = p[brake] != 0; status[10] = p[gravity] != 0; status[11] = p[guard] != 0;
@@ -346,7 +352,8 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
     code = share < 1 ? 2 : 0;
     if (asked * share > p[silently_n]) share = p[silently_n] / asked;
     if (p[turned]) share = -share;
-    command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
+    share *= p[silent_gain];
+    if (asked > 0 || !p[keeps_force]) command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
     p[writes]++, p[last_write] = asked, last_command_s = p[now];
     if (asked > 0) device->used = 1;
     if (!p[latches] && !p[force_on] && p[cause] == 3) p[force_on] = 1, p[brake] = 0, p[cause] = 0;
@@ -359,7 +366,12 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
 }
 EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
   (void)id;
-  PLAIN(*x_n = p[gain_told] * p[fx]; *y_n = p[gain_told] * p[fy]; *z_n = p[gain_told] * p[fz]);
+  double *told[3] = {x_n, y_n, z_n}, step = p[told_step];
+  if (p[untold] > 1) PLAIN((void)0);
+  PLAIN(for (int i = 0; i < 3; i++) {
+    double said = p[gain_told] * p[fx + i] + p[told_noise] * 3.4641016 * evenly();
+    *told[i] = step > 0 ? step * round(said / step) : said;
+  });
 }
 EXPORT double dhdGetComFreq(char id) { (void)id; return 1.0; }
 EXPORT unsigned int dhdGetButtonMask(char id) {

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
@@ -12,7 +13,7 @@ from study.devices.clock import RealClock
 from study.devices.force_dimension import force_limit_check, loop_cells, watchdog_check
 from study.devices.force_dimension.acceptance import VALID_FOR, acceptance_file
 from study.devices.governor import cells
-from study.devices.opening import accept_device, open_device
+from study.devices.opening import accept_device, examine_device, open_device
 from study.errors import DeviceError
 from study.workflows.checks import examine_setup
 
@@ -56,6 +57,34 @@ def test_a_device_without_an_acceptance_record_opens_for_no_hand(locked, rigs, m
 def test_another_device_firmware_or_library_voids_the_acceptance(stub, vendor, rigs, details, said):
     vendor.accept("omega.3", details=details)
     assert f"Another was accepted (omega.3, {details})" in refused(rigs) and said in details
+
+
+@pytest.mark.parametrize("firmware", [math.nan, math.inf, -math.inf, -1.0, 0.0])
+def test_a_firmware_that_is_no_version_opens_for_no_hand_and_is_not_accepted(stub, vendor, rigs, firmware):
+    """0: answered as read, and never written. An acceptance of the same words unlocks nothing."""
+    stub.set("firmware", firmware)
+    vendor.accept("omega.3", details=f"serial 4242, firmware {firmware:g}, SDK 3.17.5.0")
+    for opens in (
+        lambda: open_for_a_hand(rigs),
+        lambda: open_device("omega3", without_spring(rigs), RealClock(), 1, own_process=False).close(),
+        lambda: accept_device("omega3", without_spring(rigs), RealClock(), "Ada"),
+    ):
+        with pytest.raises(DeviceError, match=r"omega\.3 does not say its firmware.*Switch the device off and on"):
+            opens()
+        assert stub.safe and (stub.get("opened"), stub.get("writes")) == (0, stub.get("closes"))
+    found = next(each for each in examine_device("omega3") if each.name == "Driver")
+    assert found.wrong and f"gives {firmware:g} as the version" in found.value
+
+
+def test_a_serial_number_that_is_not_told_opens_for_no_hand_and_is_not_accepted(stub, vendor, rigs):
+    stub.set("serial_told", 0)
+    for details in ("serial 0, firmware 2.41, SDK 3.17.5.0", "serial 65535, firmware 2.41, SDK 3.17.5.0"):
+        vendor.accept("omega.3", details=details)
+        with pytest.raises(DeviceError, match="does not say its serial number"):
+            open_for_a_hand(rigs)
+    with pytest.raises(DeviceError, match="does not say its serial number"):
+        accept_device("omega3", without_spring(rigs), RealClock(), "Ada")
+    assert stub.safe
 
 
 def test_an_acceptance_expires_and_must_not_be_dated_in_the_future(stub, vendor, rigs):

@@ -114,7 +114,7 @@ FAULTS = {
 def test_what_cannot_be_is_refused_with_a_remedy_and_nothing_is_written(stub, calibrated, tmp_path, switch, said):
     with pytest.raises(DeviceError, match=said) as refused:
         calibrated(**{switch[0]: switch[1]})
-    assert refused.value.exit_code is ExitCode.DEVICE and refused.value.do_now
+    assert refused.value.exit_code is ExitCode.DEVICE and "NAME" not in refused.value.do_now
     assert "nothing was written" in refused.value.saved
     assert not (tmp_path / "cal.h5").exists()
     assert not stub.get("peak_n") and not stub.get("enables")

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from numba import njit
 
+from study.devices.drive.stepped_runner import CLOSE_PATIENCE_S
+from study.devices.force_dimension.rig import JOIN_S
 from study.devices.native import acquire, now_s, release, sleep_until
 
 pytestmark = pytest.mark.real_time
@@ -86,3 +88,70 @@ def test_a_device_that_let_go_while_it_was_opened_is_woken_for_the_first_force(s
         assert not stub.get("force_on")
         rig.write(np.array([0.5, 0.0, 0.0]))
         assert stub.get("force_on") and stub.applied_n.any()
+
+
+def hang_a_zero(stub, rig, late_s: float) -> None:
+    """The next zeros but one: its call lasts so long, and those of the closing do not."""
+    stub.set("write_late_s", late_s)
+    last = stub.get("writes") + 3
+    stub.set("write_late_every", last)
+    while stub.get("writes") < last:
+        time.sleep(0.001)
+
+
+def braked_within_s(stub) -> float:
+    began_s = time.monotonic()
+    while not stub.safe and time.monotonic() - began_s < 10.0:
+        time.sleep(0.001)
+    return time.monotonic() - began_s
+
+
+def test_closing_brakes_at_once_and_ends_the_thread_of_the_zeros(stub):
+    stub.set("watchdog_stretch", 1000)
+    with contextlib.closing(stub.rig(rests=True)) as rig:
+        hang_a_zero(stub, rig, 0.4)
+        closing = threading.Thread(target=rig.close)
+        closing.start()
+        braked_within_s(stub)
+        assert rig._resting.is_alive()  # what hangs holds up neither zero nor brakes
+        closing.join()
+        assert not rig._resting.is_alive()
+        assert stub.safe and (stub.get("stops"), stub.get("closes")) == (1, 1)
+
+
+def test_closing_waits_for_a_zero_that_hangs_no_longer_than_half_of_its_time(stub):
+    stub.set("watchdog_stretch", 1000)
+    with contextlib.closing(stub.rig(rests=True)) as rig:
+        hang_a_zero(stub, rig, 3.0)
+        began_s = time.monotonic()
+        assert rig.close()
+        assert JOIN_S <= time.monotonic() - began_s < CLOSE_PATIENCE_S
+        assert rig._resting.is_alive() and stub.safe
+
+
+@pytest.mark.parametrize("late_s", [0.3, 0.8], ids=["waited for", "given up"])
+@pytest.mark.parametrize("function", ["dhdGetStatus", "dhdSetBrakes", "dhdEnableForce"])
+def test_a_call_that_wakes_the_device_too_late_leaves_it_braked_once_it_is_closed(
+    stub, vendor, monkeypatch, function, late_s
+):
+    """It hangs while the device is closed, and the device does not even disconnect."""
+    make_ready = vendor.make_ready
+
+    def make_ready_and_stand_still(*arguments) -> float:
+        drops_after_s: float = make_ready(*arguments)
+        time.sleep(drops_after_s + 0.02)
+        assert not stub.get("force_on")  # so that the first zero wakes it
+        stub.set("watchdog_stretch", 1000)
+        stub.delay(function, late_s, 1)
+        return drops_after_s
+
+    monkeypatch.setattr(vendor, "make_ready", make_ready_and_stand_still)
+    with contextlib.closing(stub.rig(rests=True)) as rig:
+        time.sleep(0.1)
+        stub.fail("dhdClose")
+        rig.close()
+        assert stub.safe
+        rig._resting.join()
+        assert stub.safe
+        stub.fail("dhdClose", times=0)
+    assert (stub.get("opened"), stub.safe) == (0, True)

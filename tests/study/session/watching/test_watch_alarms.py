@@ -10,7 +10,7 @@ from study.session.facts.events import (
     SessionInterrupted,
     SessionResumed,
 )
-from study.session.facts.void_reasons import SCREEN_LATE
+from study.session.facts.void_reasons import HARDLY_ARRIVED, SCREEN_LATE
 from study.session.state.due_trial import Present
 from study.session.state.machine import next_action
 from study.session.watching.make_watch_view import LiveInfo, watch_view
@@ -97,6 +97,15 @@ def test_three_void_trials_of_ten_are_an_alarm(story):
     story.spoil("late ticks")
     assert kinds(story.view()) == ["voids"]
     assert "3 of the last 4 presentations were void, the last because late ticks" in story.view().alarms[0].sentence
+
+
+def test_a_trial_of_which_hardly_anything_arrived_is_an_alarm(story):
+    story.answer(True)
+    assert kinds(story.view()) == []
+    story.answer(True, flags=("slew limited", HARDLY_ARRIVED), status="flagged")
+    assert kinds(story.view()) == ["still"]
+    sentence = story.view().alarms[0].sentence
+    assert "In 1 of the last 2 presentations less motion arrived" in sentence and "look at motors" in sentence
 
 
 @pytest.mark.parametrize(("minutes", "kind", "urgent"), [(97, "time near", False), (121, "time reached", True)])

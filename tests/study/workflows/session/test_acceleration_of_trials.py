@@ -9,7 +9,7 @@ from protocols.trial import TrialStatus, VoidCause
 from study.devices.device import Fault, Health
 from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
-from study.session.facts.void_reasons import computer_too_busy
+from study.session.facts.void_reasons import HARDLY_ARRIVED, computer_too_busy
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import read_log
 from study.tui.trial_words import void_words
@@ -18,6 +18,31 @@ from study.workflows.trial.judge_trial import judge
 
 GOOD = SensorFacts(packets=9900, lost=100, spoiled_bytes=1500, restarts=0, ticks=1000, unplaced_ticks=0, drift_ppm=31.5)
 BAD = replace(GOOD, packets=9000, lost=1000)
+
+
+@pytest.fixture
+def dead(monkeypatch):
+    """How much of the acceleration is recorded, of the device that is opened next."""
+    share = [0.0]
+    real_open = conduct_session.open_device
+
+    def opened(*arguments):
+        device = real_open(*arguments)
+        release = device.release
+
+        def release_and_deaden():
+            played = release()
+            if played.recording is None:
+                return played
+            response = played.recording.response
+            response = replace(response, samples=share[0] * response.samples + response.samples[:1])
+            return replace(played, recording=replace(played.recording, response=response))
+
+        device.release = release_and_deaden
+        return device
+
+    monkeypatch.setattr(conduct_session, "open_device", opened)
+    return share
 
 
 @pytest.fixture
@@ -115,3 +140,15 @@ def test_such_a_protocol_begins_nothing_where_there_is_no_accelerometer(sitter, 
     heard[1][0] = False
     with pytest.raises(DeviceError, match="needs the accelerometer"):
         sitter.whole()
+
+
+@pytest.mark.parametrize(("share", "flagged"), [(0.0, True), (0.02, True), (0.3, False), (1.0, False)])
+def test_a_strong_stimulus_of_which_nothing_arrives_is_flagged_and_its_answer_counts(sitter, dead, share, flagged):
+    """A device that answers that all is well and does not move, or a sensor that is dead."""
+    dead[0] = share
+    done = sitter.whole()
+    rows = [row for row in done.state.trials if row.counts and row.delivered_mps2 is not None]
+    measured = [event for event in read_log(done.folder.log).events if event.event == "trial_measured"]
+    said = {row.level_n: HARDLY_ARRIVED in event.flags for row, event in zip(done.state.trials, measured, strict=True)}
+    assert max(row.level_n for row in rows) >= 1.0
+    assert all(said[row.level_n] is (flagged and row.level_n >= 1.0) for row in rows if not 0.6 < row.level_n < 1.0)
