@@ -13,7 +13,6 @@ is the answer 1 to a 1 and a false alarm the answer 1 to a 2. So c > 0 is a tend
 the second interval), c < 0 a tendency to answer 1. Simulated participants state theirs in the same way.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -40,62 +39,6 @@ def response_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> R
         return None
     z_hit, z_false_alarm = _corrected_z(hits), _corrected_z(false_alarms)
     return ResponseBias(d_prime=z_hit - z_false_alarm, criterion=-0.5 * (z_hit + z_false_alarm))
-
-
-@dataclass(frozen=True, slots=True)
-class CriterionDrift:
-    """Change of the criterion during a session."""
-
-    per_100_trials: float
-    """Of c, in units of d'."""
-    p: float
-    """Two-sided, against no drift."""
-    p_without_a_run: float
-    """The largest p that leaving out a single run gives: one odd run is no drift."""
-
-
-FEWEST_RUNS = 4
-"""Without one of them, three must still show it: two criteria differ, but do not drift."""
-
-_Point = tuple[float, float, float]
-"""Of a run: trials before its middle, criterion, and weight, which is one over the variance."""
-
-
-def criterion_drift(runs: Sequence[tuple[Sequence[int], Sequence[bool]]]) -> CriterionDrift | None:
-    """Weighted regression of the runs' criteria on the trials before their middles. runs: of one session in their
-    order, each as for `response_bias`. None with fewer than `FEWEST_RUNS` that have both directions.
-
-    Each criterion has the variance of two binomial z scores (Macmillan and Creelman, chapter 13); what differs between
-    runs by more than that counts as drift, too, as far as it follows the order.
-    """
-    points, before = list[_Point](), 0
-    for shown, correct in runs:
-        if (bias := response_bias(shown, correct)) is not None:
-            points.append((before + len(shown) / 2.0, bias.criterion, 1.0 / _criterion_variance(shown, correct)))
-        before += len(shown)
-    if len(points) < FEWEST_RUNS:
-        return None
-    slope, p = _trend(points)
-    others = (_trend([*points[:left], *points[left + 1 :]])[1] for left in range(len(points)))
-    return CriterionDrift(100.0 * slope, p, max(others))
-
-
-def _trend(points: Sequence[_Point]) -> tuple[float, float]:
-    """Slope by weighted least squares, and its p."""
-    weight = sum(w for _, _, w in points)
-    middle = sum(w * place for place, _, w in points) / weight
-    spread = sum(w * (place - middle) ** 2 for place, _, w in points)
-    slope = sum(w * (place - middle) * criterion for place, criterion, w in points) / spread
-    return slope, 2.0 * NormalDist().cdf(-abs(slope) * math.sqrt(spread))
-
-
-def _criterion_variance(directions_shown: Sequence[int], correct: Sequence[bool]) -> float:
-    """Of two z scores at the run's share of right answers, as without a bias: at the rates of the run itself, runs of a
-    strong bias would count for little."""
-    rate = (sum(correct) + 0.5) / (len(correct) + 1.0)
-    by_answer = rate * (1.0 - rate) / NormalDist().pdf(NormalDist().inv_cdf(rate)) ** 2
-    first = sum(shown == 1 for shown in directions_shown)
-    return by_answer * (1.0 / first + 1.0 / (len(directions_shown) - first)) / 4.0
 
 
 def _corrected_z(answers: Sequence[bool]) -> float:

@@ -3,9 +3,12 @@
 Each worker imports hapteq itself, so that all must have the same version: other code could give other numbers.
 """
 
+import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor
 from contextlib import contextmanager
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
 
@@ -16,6 +19,10 @@ if TYPE_CHECKING:
 
 PATIENCE_S = 10.0
 """Timeout in seconds for the scheduler to answer."""
+WITHOUT_WORKERS_S = 60.0
+"""Longest time in seconds that work waits at a scheduler without any worker, which may be starting anew."""
+GLANCE_S = 1.0
+"""Interval in seconds at which the workers are counted."""
 INSTALL = "pip install 'hapteq[cluster]'"
 
 
@@ -25,7 +32,7 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
     one_thread: refuse workers that do several pieces at once, for work that draws figures or measures processor time.
 
     Raises StudyError where no scheduler answers, it has no workers, a worker has another version, or, later, where
-    the scheduler is lost or workers die at the same piece again and again.
+    the scheduler is lost, workers die at the same piece again and again, or none is left for `WITHOUT_WORKERS_S`.
     """
     try:
         import dask
@@ -50,24 +57,73 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
     # A recording is sent to its worker as a value; distributed warns against such large arguments.
     with client, dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 GB"}):
         _require_workers(client, address, one_thread)
+        lone = threading.Event()
         try:
-            with client.get_executor(pure=False) as executor:
+            with _executor(client) as executor, _watch(client, executor, lone):
                 yield executor
         except (KilledWorker, CommClosedError, CancelledError) as problem:
-            raise _undone_error(problem) from problem
-        except (TypeError, ValueError) as problem:
-            # A future that is lost with its scheduler has no result, and distributed's executor fails on unpacking it.
-            if client.status == "running":
+            raise _undone_error(problem, address, lone) from problem
+        except (RuntimeError, TypeError, ValueError) as problem:
+            # A future that is lost with its scheduler has no result, and distributed's executor fails on unpacking it;
+            # one that was given up for want of workers takes no more work.
+            if client.status == "running" and not lone.is_set():
                 raise
-            raise _undone_error(problem) from problem
+            raise _undone_error(problem, address, lone) from problem
 
 
-def _undone_error(problem: BaseException) -> StudyError:
+@contextmanager
+def _executor(client: "Client") -> Iterator[Executor]:
+    """Of the client. What is not finished on leaving is cancelled: the executor's own end waits for it, and for what
+    was finished and is made anew because its worker died."""
+    executor = client.get_executor(pure=False)
+    try:
+        yield executor
+    finally:
+        executor.shutdown(wait=False)
+
+
+@contextmanager
+def _watch(client: "Client", executor: Executor, lone: threading.Event) -> Iterator[None]:
+    """Cancel all work, and set `lone`, where there were no workers for `WITHOUT_WORKERS_S`."""
+    left = threading.Event()
+    watcher = threading.Thread(target=partial(_await_lone, client, executor, lone, left), daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        left.set()
+        watcher.join()
+
+
+def _await_lone(client: "Client", executor: Executor, lone: threading.Event, left: threading.Event) -> None:
+    last_seen_s = time.monotonic()
+    while not left.wait(GLANCE_S):
+        try:
+            workers = client.nthreads()
+        except (OSError, TypeError, ValueError):  # of a scheduler that is lost, which the work itself notices
+            return
+        if workers:
+            last_seen_s = time.monotonic()
+        elif time.monotonic() - last_seen_s > WITHOUT_WORKERS_S:
+            lone.set()
+            executor.shutdown(wait=False)
+            return
+
+
+def _undone_error(problem: BaseException, address: str, lone: threading.Event) -> StudyError:
+    kept = "What was finished is kept."
+    if lone.is_set():
+        return StudyError(
+            "The cluster has no workers any more",
+            f"For {WITHOUT_WORKERS_S:g} s the scheduler at {address} had none: they ended, or cannot reach it.",
+            f"Start some: dask worker {address}. Then run the same command again: it goes on where it stopped.",
+            saved=kept,
+        )
     return StudyError(
         "The cluster did not do this",
         f"{type(problem).__name__}: {problem}.",
         "Look at the scheduler and its workers, then run the same command again: it goes on where it stopped.",
-        saved="What was finished is kept.",
+        saved=kept,
     )
 
 

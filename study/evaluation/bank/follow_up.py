@@ -18,6 +18,7 @@ from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import Workers, ask_engine, forget_recording, is_answered
+from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redraw_recording
@@ -52,9 +53,10 @@ def follow_up(
     if not starts:
         return ()
     again = open_proof_folder(folder.path / NEXT, plan.seed, plan.brief)
-    for start in starts:
-        if not again.label(start.number).exists():
-            _seal(folder, again, plan, start)
+    with finished_cases(again):
+        for start in starts:
+            if not again.label(start.number).exists():
+                _seal(folder, again, plan, start)
     seal(again)
     labels = [read_label(again.label(each.number)) for each in starts]
     names = [label[which]["name"] for label in labels for which in (PROPOSED, DRAWN) if which in label]
@@ -75,8 +77,7 @@ def follow_up(
 
 
 def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcome) -> None:
-    """Write both follow-up cases of `start`; the label is written last, so that a missing label means an unfinished
-    case."""
+    """Write both follow-up cases of `start`; a missing label means that neither is finished."""
     first = read_label(folder.label(start.number))
     place = folder.open / first["name"]
     proposal = read_answer(place).get("proposal")
@@ -92,6 +93,8 @@ def _seal(folder: ProofFolder, again: ProofFolder, plan: BankPlan, start: Outcom
         wanted = {DRAWN: drawn} | ({PROPOSED: proposed} if proposed else {})
         label |= {which: _write_case(again, plan, (first, place), several) for which, several in wanted.items()}
     write_text(again.label(start.number), json.dumps(label, indent=1) + "\n")
+    for which in {PROPOSED, DRAWN} & label.keys():
+        show_case(again, again.begun / label[which]["name"])
 
 
 def _write_case(
@@ -100,9 +103,7 @@ def _write_case(
     """Write one follow-up case and return its part of the label. The first recording is drawn again and must equal
     the one that was answered."""
     label, first = start
-    name = secrets.token_hex(6)
-    place = again.open / name
-    place.mkdir()
+    place = begin_case(again)
     case = redraw_recording(place, plan, label)
     for number, each in enumerate(experiments):
         further = case.again(each.commands, each.kind, each.added, NOISE_SEED + number)
@@ -110,7 +111,7 @@ def _write_case(
     for kept in (MODEL, SETTINGS):
         write_text(place / kept, read_text(first / kept))
     return {
-        "name": name,
+        "name": place.name,
         "words": "; ".join(each.words for each in experiments),
         "recording_sha256": sha256_of(place / RECORDING),
         "model_sha256": sha256_of(place / MODEL),

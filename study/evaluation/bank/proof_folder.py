@@ -12,13 +12,18 @@ from study.store.disk.text_file import read_text, write_text
 @dataclass(frozen=True, slots=True)
 class ProofFolder:
     """bank.json: settings of the bank. open: one folder per case with everything that the diagnosis gets. sealed:
-    the truths, one file each. labels.sha256: their hashes in the format of `sha256sum --check`."""
+    the truths, one file each. labels.sha256: their hashes in the format of `sha256sum --check`. begun: cases that are
+    being written."""
 
     path: Path
 
     @property
     def open(self) -> Path:
         return self.path / "open"
+
+    @property
+    def begun(self) -> Path:
+        return self.path / "begun"
 
     @property
     def sealed(self) -> Path:

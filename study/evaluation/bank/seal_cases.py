@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from study.errors import StudyError
+from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_label, seal
 from study.evaluation.challenge.draw_bank import Draw, case_of, draw
@@ -69,7 +70,7 @@ def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Cal
     missing = [each for each in drawn if not folder.label(each.number).exists()]
     done = len(drawn) - len(missing)
     on_sealed(done)
-    with worker_processes(workers if len(missing) > 1 else 1) as pool:
+    with finished_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
         for finished in as_completed([pool.submit(seal_one, folder, each) for each in missing]):
             finished.result()
             done += 1
@@ -78,14 +79,14 @@ def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Cal
 
 
 def seal_one(folder: ProofFolder, each: Draw) -> None:
-    """Write one case; the label is written last, so that a missing label means an unfinished case."""
-    name = secrets.token_hex(6)
-    case, place = case_of(each, name), folder.open / name
-    place.mkdir()
+    """Write one case; a missing label means an unfinished case."""
+    place = begin_case(folder)
+    case = case_of(each, place.name)
     write_recording(place / RECORDING, case.recording, precision="float32")
     write_mechanical_model(place / MODEL, case.model)
     write_text(place / SETTINGS, settings_text(each.without, PROCESSOR_S))
     write_text(folder.label(each.number), json.dumps(_label(each, case, place), indent=1, allow_nan=False) + "\n")
+    show_case(folder, place)
 
 
 def settings_text(without: Sequence[str], processor_s: float | None = None) -> str:

@@ -15,6 +15,7 @@ from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import Workers, ask_engine, is_answered
+from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
 from study.evaluation.bank.proof_folder import CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import settings_text
@@ -69,7 +70,8 @@ def seal_injections(folder: ProofFolder, carried: Sequence[Carrier], count: int,
             "Give recordings of open loops, or leave --inject out.",
             saved="The diagnoses are written.",
         )
-    names = [_seal_injection(folder, carried, number, seed) for number in range(count)]
+    with finished_cases(folder):
+        names = [_seal_injection(folder, carried, number, seed) for number in range(count)]
     seal(folder)
     return tuple(names)
 
@@ -90,15 +92,14 @@ def _seal_injection(folder: ProofFolder, carried: Sequence[Carrier], number: int
         spoiled, values = done.recording, values | done.values
     sound, rest, spoiled = (_nameless(without_lead(each)) for each in (sound, rest, spoiled))
     change = held_out_change(sound, rest, spoiled) if effects else 1.0
-    name = secrets.token_hex(6)
-    place = folder.open / name
-    (place / CLEAN).mkdir(parents=True)
+    place = begin_case(folder)
+    (place / CLEAN).mkdir()
     write_recording(place / RECORDING, spoiled, precision="float64")
     write_recording(place / CLEAN / RECORDING, sound, precision="float64")
     write_mechanical_model(place / MODEL, carrier.model)
     write_text(place / SETTINGS, settings_text((), PROCESSOR_S))
     document = {
-        "name": name,
+        "name": place.name,
         "number": number,
         "seed": seed,
         "recording": carrier.name,
@@ -113,7 +114,8 @@ def _seal_injection(folder: ProofFolder, carried: Sequence[Carrier], number: int
         "salt": secrets.token_hex(16),
     }
     write_text(label, json.dumps(document, indent=1, allow_nan=False) + "\n")
-    return name
+    show_case(folder, place)
+    return place.name
 
 
 def _drawn_effects(recording: Recording, random: np.random.Generator) -> tuple[str, ...]:

@@ -39,13 +39,14 @@ def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
 
 
 def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
-    """Parse rows. Unknown columns are ignored; trailing columns with a default may be missing. Raises CsvError."""
+    """Parse rows. Unknown columns are ignored, but none may be there twice; trailing columns with a default may be
+    missing. Raises CsvError."""
     try:
         lines = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
     except csv.Error as error:
         raise CsvError((f"this is not CSV: {error}",)) from error
     names = _present_columns(tuple(lines[0]), row_type)
-    if problem := header_problem(tuple(lines[0]), names):
+    if problem := header_problem(tuple(lines[0]), names) or _doubled_problem(lines[0]):
         raise CsvError((problem,))
     hints = get_type_hints(row_type)
     found: list[Row] = []
@@ -94,6 +95,13 @@ def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
             found = f"is '{header[position - 1]}'" if position <= len(header) else "is missing"
             return f"column {position} of the header {found}; it must be '{name}' (of {', '.join(expected)})"
     return ""
+
+
+def _doubled_problem(header: Sequence[str]) -> str:
+    """Problem with a header that names a column twice; spreadsheets leave empty names at its end."""
+    names = [name.strip() for name in header]
+    doubled = next((name for place, name in enumerate(names) if name and name in names[:place]), None)
+    return f"the header names the column '{doubled}' twice; only one of both can be meant" if doubled else ""
 
 
 def csv_line(fields_of_row: Sequence[str]) -> str:

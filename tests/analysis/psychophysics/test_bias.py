@@ -3,7 +3,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from analysis.psychophysics.bias import criterion_drift, response_bias
+from analysis.psychophysics.bias import response_bias
 
 
 def answers(d_prime: float, criterion: float, n: int, seed: int) -> tuple[list[int], list[bool]]:
@@ -39,28 +39,3 @@ def test_always_answering_two_shows_as_a_positive_criterion():
 def test_one_direction_alone_says_nothing():
     assert response_bias([1, 1], [True, False]) is None
     assert response_bias([], []) is None
-
-
-def drifting(per_100_trials: float, seed: int, start: float = 0.0, runs: int = 5, n: int = 70):
-    return [
-        answers(1.64, start + per_100_trials * (run + 0.5) * n / 100.0, n, 1000 * seed + run) for run in range(runs)
-    ]
-
-
-@pytest.mark.parametrize("per_100_trials", [0.0, 0.2, -0.2])
-def test_a_drift_is_recovered_with_its_sign(per_100_trials):
-    found = [criterion_drift(drifting(per_100_trials, seed)).per_100_trials for seed in range(60)]
-    assert np.mean(found) == pytest.approx(per_100_trials, abs=0.03)
-
-
-@pytest.mark.parametrize("criterion", [0.0, 0.5])
-def test_no_drift_is_found_as_often_as_the_level_says(criterion):
-    p = np.array([criterion_drift(drifting(0.0, seed, criterion)).p for seed in range(1000)])
-    assert np.mean(p < 0.05) == pytest.approx(0.05, abs=0.025)
-    assert np.mean(p < 0.01) < 0.02
-
-
-def test_two_runs_or_one_direction_alone_show_no_drift():
-    assert criterion_drift(drifting(1.0, 1, runs=2)) is None
-    assert criterion_drift([*drifting(1.0, 1, runs=2), ([1, 1, 1], [True, True, False])]) is None
-    assert criterion_drift([]) is None

@@ -104,6 +104,16 @@ def test_a_count_that_is_none_is_not_believed(data, tmp_path, count):
     assert collect_exported(tmp_path / "ds").left_out == ()
 
 
+def test_every_fact_of_an_export_is_described(data, tmp_path):
+    export_study(collect_sessions(data), data, tmp_path / "ds", "csv")
+    facts = json.loads((tmp_path / "ds" / "facts.json").read_text("utf-8"))
+    page = (Path(__file__).parents[3] / "docs" / "statistics.md").read_text("utf-8")
+    table = page.partition("| fact | what it holds |")[2].partition("\n\n")[0]
+    named = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
+    described = {name for cell in named for name in re.findall(r"`(\w+)`", cell)}
+    assert described == facts.keys() - {"study"}
+
+
 def test_the_quality_of_models_comes_back_from_an_export(data, tmp_path):
     collected = replace(collect_sessions(data), qualities=(("P01_001 and P02_001", "It predicts 90 %."),))
     export_study(collected, data, tmp_path / "ds", "psych-ds")

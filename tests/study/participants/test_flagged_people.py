@@ -49,11 +49,13 @@ def session(observer, subject, seed):
     return trials
 
 
-def warnings_of(observer, seed, protocol):
-    trials = session(observer, "P01", seed)
+def warnings_of(observer, seed, protocol, company):
+    """What a study says of this person beside the others of it, one sentence after the other."""
+    mine = session(observer, "P01", seed)
+    trials = [*mine, *company]
     rows = thresholds(trials, PUBLISHED)
     said = study_warnings(trials, rows, threshold_table(rows, HZ), protocol)
-    return " ".join((*said, repeat_warning(trials)))
+    return " ".join(sentence for sentence in (*said, repeat_warning(mine)) if "P01" in sentence)
 
 
 def people(kind, count):
@@ -73,8 +75,13 @@ def said(published_study):
         "drifting": [find_observer("criterion_drift", number) for number in range(40)],
         "guessing": [find_observer("guesser", number) for number in range(8)],
     }
+    company = [
+        trial
+        for place, observer in enumerate(people("person", 9))
+        for trial in session(observer, f"Q{place}", 900 + place)
+    ]
     return {
-        name: [warnings_of(observer, 5000 + number, published_study) for number, observer in enumerate(group)]
+        name: [warnings_of(observer, 5000 + number, published_study, company) for number, observer in enumerate(group)]
         for name, group in groups.items()
     }
 
@@ -99,16 +106,16 @@ def test_who_guesses_is_named_each_time(said):
 
 
 def test_a_criterion_that_drifts_by_0_3_in_100_trials_is_named_mostly(said):
-    """A session of some 350 trials moves it by 1. Of other sessions the drift was named in 112 of 240, it or
-    a leaning in 105 of 120; bounds are three standard errors below."""
+    """A session of some 350 trials moves it by 1. Of other sessions, each among nine honest people, the drift was named
+    in 438 of 1000, it or a leaning in 875 (tests/references/drift_flag.py)."""
     drifting = said["drifting"]
     assert named(drifting, DRIFTS) >= 9
     assert sum(DRIFTS in text or LEANS in text for text in drifting) >= 28
 
 
 def test_honest_people_are_hardly_ever_named(said):
-    """Of 60. Of 600 other honest sessions 5 were named for a drift, 34 for a leaning: bounds are three standard errors
-    above."""
+    """Of 60. Of 1000 other honest sessions 3 were named for a drift, 56 for either: bounds are three standard errors
+    above, or less."""
     honest = said["honest"]
     assert named(honest, REPEATED) == 0
     assert named(honest, DRIFTS) <= 2

@@ -181,3 +181,15 @@ def test_a_table_of_before_a_column_was_added_agrees_with_rows_of_today():
     last = fields(Trial)[-1]
     changed = replace(TRIAL, **{last.name: "something else", "level_n": 9.0})
     assert as_written_in(before, (changed,), Trial) == (replace(read, level_n=9.0),)
+
+
+@pytest.mark.parametrize("name", ["level_n", " answer", "mine"])
+def test_a_column_that_is_there_twice_is_refused(name, tmp_path):
+    """Neither of both is taken; further columns of other names stay allowed, and so do empty ones at the end."""
+    header, row = rows_to_csv([TRIAL], Trial).splitlines()
+    path = tmp_path / "trials.csv"
+    path.write_text(f"{header},mine,{name},,\n{row},1,2,,\n")
+    with pytest.raises(UnusableFileError, match=f"names the column '{name.strip()}' twice"):
+        read_trials(path)
+    path.write_text(f"{header},mine,other,,\n{row},1,2,,\n")
+    assert read_trials(path) == (TRIAL,)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from analysis.evaluation.laws.law_error import FreshMotion
+from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import seal
 from study.evaluation.bank.seal_cases import PROCESSOR_S, SALT_BYTES, BankPlan
@@ -31,7 +32,7 @@ def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Call
     left = [each for each in drawn if not folder.label(each.number).exists()]
     done = len(drawn) - len(left)
     on_sealed(done)
-    with worker_processes(workers if len(left) > 1 else 1) as pool:
+    with finished_cases(folder), worker_processes(workers if len(left) > 1 else 1) as pool:
         for finished in as_completed([pool.submit(_seal_law, folder, each) for each in left]):
             finished.result()
             done += 1
@@ -68,10 +69,9 @@ def _fresh_motion(of: dict[str, Any], axes: Sequence[str], pushed: Sequence[str]
 
 
 def _seal_law(folder: ProofFolder, each: LawDraw) -> None:
-    """Write one case; the label is written last, so that a missing label means an unfinished case."""
-    name = secrets.token_hex(6)
-    found, place = law_case(each, name), folder.open / name
-    place.mkdir()
+    """Write one case; a missing label means an unfinished case."""
+    place = begin_case(folder)
+    found = law_case(each, place.name)
     write_recording(place / RECORDING, found.case.recording, precision="float32")
     write_mechanical_model(place / MODEL, found.case.model)
     asked = {"without": [], "discovery": True, "processor_s": PROCESSOR_S}
@@ -79,6 +79,7 @@ def _seal_law(folder: ProofFolder, each: LawDraw) -> None:
     np.savez(fresh_file(folder, each.number), allow_pickle=False, **_arrays(found.fresh))
     label = _label(folder, each, found, place)
     write_text(folder.label(each.number), json.dumps(label, indent=1, allow_nan=False) + "\n")
+    show_case(folder, place)
 
 
 def _arrays(fresh: Sequence[Fresh]) -> dict[str, Any]:

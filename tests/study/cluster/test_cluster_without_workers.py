@@ -1,0 +1,107 @@
+"""A dask scheduler whose last worker dies: the work waits a declared time for another, then says what to do."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+
+import pytest
+
+from analysis.psychophysics.power.simulated_study import Crowd
+from study.errors import StudyError
+from study.workflows import cluster
+from study.workflows.cluster import cluster_workers
+from study.workflows.planning.simulate_power import PowerPlan, simulate_power
+from tests.analysis.conftest import PUBLISHED
+
+pytestmark = [pytest.mark.real_time, pytest.mark.timeout(180)]
+distributed = pytest.importorskip("distributed")
+
+PLAN = PowerPlan(Crowd((5.0, 45.0), (0.7, 1.4)), PUBLISHED, (3,), 40, 3)
+"""Four pieces of work."""
+
+
+@contextmanager
+def a_worker(address):
+    """Without the nanny that would start it anew."""
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1"]
+    process = subprocess.Popen([*command, "--no-dashboard"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        with distributed.Client(address, set_as_default=False) as client:
+            client.wait_for_workers(1, timeout=60)
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def address():
+    """Of a scheduler on loopback without workers."""
+    with distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0") as alone:
+        yield alone.scheduler_address
+
+
+@pytest.fixture
+def here(tmp_path):
+    with ThreadPoolExecutor(1) as pool:
+        return simulate_power(PLAN, tmp_path / "here", pool, lambda _: None)
+
+
+def killing(worker, then=lambda: None):
+    """To be called with the number of finished studies: kills the worker at the first ones, and then calls `then`."""
+
+    def on_finished(finished):
+        if finished and worker.poll() is None:
+            os.kill(worker.pid, signal.SIGKILL)
+            worker.wait()
+            then()
+
+    return on_finished
+
+
+def test_without_workers_it_ends_in_words_and_goes_on_with_another(address, here, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "WITHOUT_WORKERS_S", 2.0)
+    out = tmp_path / "power"
+    with (
+        a_worker(address) as worker,
+        pytest.raises(StudyError, match="For 2 s the scheduler at .* had none") as ended,
+        cluster_workers(address) as pool,
+    ):
+        simulate_power(PLAN, out, pool, killing(worker))
+    assert f"dask worker {address}" in ended.value.do_now
+    assert "the same command again" in ended.value.do_now
+    assert ended.value.saved == "What was finished is kept."
+    kept = (out / "studies.jsonl").read_text("utf-8").splitlines()
+    assert 1 < len(kept) < 5  # the plan, and some of four pieces
+    with a_worker(address), cluster_workers(address) as pool:
+        assert simulate_power(PLAN, out, pool, lambda _: None) == here
+    assert (out / "studies.jsonl").read_text("utf-8").splitlines()[: len(kept)] == kept
+
+
+def test_another_worker_within_the_time_goes_on(address, here, tmp_path):
+    with a_worker(address) as worker, cluster_workers(address) as pool:
+        late = []
+        comes = threading.Timer(3.0, lambda: late.append(a_worker(address)) or late[0].__enter__())
+        found = simulate_power(PLAN, tmp_path / "power", pool, killing(worker, comes.start))
+        assert found == here
+        comes.join()
+        late[0].__exit__(None, None, None)
+
+
+def test_the_wait_for_a_worker_ends_at_once_by_ctrl_c(address, tmp_path):
+    main = threading.main_thread().ident
+    interrupt = threading.Timer(3.0, lambda: signal.pthread_kill(main, signal.SIGINT))
+    began = []
+
+    def begin():
+        began.append(time.monotonic())
+        interrupt.start()
+
+    with a_worker(address) as worker, pytest.raises(KeyboardInterrupt), cluster_workers(address) as pool:
+        simulate_power(PLAN, tmp_path / "power", pool, killing(worker, begin))
+    assert time.monotonic() - began[0] < 15.0
