@@ -106,7 +106,7 @@ def _explain_impacts(
     from analysis.diagnosis.search.impacts import explain_impacts
 
     progress("looking for play that rattles", 0.9)
-    rattled = explain_impacts(result.context, result.found, fitting.chosen.floors, may_be_named)
+    rattled = explain_impacts(result.context, result.found, fitting.chosen.floors, may_be_named, settings.time_left)
     if rattled is None:
         return found
     return replace(found, result=SearchResult(result.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))

@@ -5,5 +5,5 @@
 best to the end, `parsimony` chooses. Where the drive repeats, ranks and first fits are those of one period of each
 segment (`short_recordings`). `identifiability` and `revise_selection` take out or exchange what the data do not fix or
 need; `verdict` says what may be claimed. `guard` keeps the crash of an effect from ending it all, `time_budget` ends it
-early; `impacts` is for rattling play. Begin at `search.py`.
+early; `impacts` is for rattling play, compared by `band_power_comparison`. Begin at `search.py`.
 """

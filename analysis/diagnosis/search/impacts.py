@@ -3,19 +3,18 @@
 Two simulations of a drive with play diverge within a few impacts, however small their initial difference (Ott, Chaos in
 Dynamical Systems, chapter 4). So the difference between two simulations of one hypothesis takes the place of the noise.
 
-Where play alone leaves more than chance, a fault of the sensor is looked for beside it: its starting values come from
-the readings themselves (a line, repeats, a step, a limit), which need no prediction of the waveform.
+Where play alone leaves more than chance, a second effect is looked for beside it: faults of the sensor, whose starting
+values come from the readings themselves (a line, repeats, a limit), and what the search by waveforms tried first.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from analysis.diagnosis.errors.band_power import BandPower
 from analysis.diagnosis.errors.band_power_fit import BandPowerFit, View, evaluate_hypothesis, fit_band_power, perturb
 from analysis.diagnosis.errors.excited_segments import select_excited_segments
-from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import (
     NOTHING,
@@ -28,19 +27,19 @@ from analysis.diagnosis.errors.hypothesis import (
 from analysis.diagnosis.errors.output_error import evaluate_fit, expected_gain, gather_evidence
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
+from analysis.diagnosis.search.band_power_comparison import comparison_of, is_as_good, is_convincing, worst_part
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.identifiability import open_effects
-from analysis.diagnosis.search.search_context import STARTING, FittedCandidate, SearchContext
+from analysis.diagnosis.search.search_context import STARTING, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import candidates
+from analysis.diagnosis.search.time_budget import always
 from analysis.diagnosis.settings import (
     EXPLAINED_BY_CHANCE,
-    IMPACTS_AS_GOOD,
-    IMPACTS_ERROR,
-    IMPACTS_LEAST_SPREAD,
     IMPACTS_SHARE,
     PEAKED_KURTOSIS,
     VARIES_ERROR,
 )
+from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import Effect, Values
 from equalizer.effects.placing import place_of_effect
 from equalizer.effects.starts.evidence import Evidence
@@ -59,10 +58,14 @@ RIVAL = "loose_joint"
 
 
 def explain_impacts(
-    context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor], catalogue: Sequence[Effect]
+    context: SearchContext,
+    found: Explanation,
+    floors: Sequence[NoiseFloor],
+    catalogue: Sequence[Effect],
+    time_left: TimeBudget = always,
 ) -> Explanation | None:
     """The explanation by play, compared by band power; None where the response is regular, or play does not explain
-    it."""
+    it. time_left: asked before a second effect is looked for."""
     effects = {effect.name: effect for effect in catalogue}
     if "backlash" not in effects or not isinstance(context.whole, FreeSimulation):
         return None
@@ -79,40 +82,43 @@ def explain_impacts(
     others = list(places[1:])
     if RIVAL in effects:
         others.append(_fit_claim(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
-    fits = _with_sensor_fault(context, view, best, [e for e in catalogue if place_of_effect(e) == "sensor"])
-    named = _judge(context, found, fits, [rival.hypothesis for rival in others if _is_model(rival)])
+    seconds = _suggest_seconds(context, found, best, catalogue) if time_left() else []
+    fits = _with_second_effect(context, view, best, seconds)
+    rivals = [rival.hypothesis for rival in others if rival.hypothesis.claims and np.isfinite(rival.cost)]
+    named = _judge(context, found, fits, rivals)
     # Where the gap may be zero, something else makes the response irregular.
     if named is None or any(open_effects(context, named)) or not _needs_gap(context, view, fits[-1]):
         return None
     return named
 
 
-def _with_sensor_fault(
-    context: SearchContext, view: View, alone: BandPowerFit, faults: Sequence[Effect]
-) -> tuple[BandPowerFit, ...]:
-    """The fit of play, and where it leaves more than chance, that of play with the sensor fault that lowers the cost
-    most, if this takes most of what is left."""
-    comparison = _comparison(context, alone)
-    before = comparison.score_candidate(alone.deviations, alone.hypothesis)
-    if _worst_part(before) <= EXPLAINED_BY_CHANCE:
-        return (alone,)
+def _suggest_seconds(
+    context: SearchContext, found: Explanation, alone: BandPowerFit, catalogue: Sequence[Effect]
+) -> list[Hypothesis]:
+    """Hypotheses of a second effect beside play: faults of the sensor, started from the readings, and what the search
+    by waveforms tried first, as it was fitted there."""
     played = evaluate_fit(context.measure, context.tuning, alone.deviations, alone.hypothesis)
     evidence = gather_evidence(context.measure, context.tuning, played)[0]
-    tried = [
-        evaluate_hypothesis(view, alone.deviations, combine(alone.hypothesis, fault))
-        for fault in candidates(faults, evidence, context.guard.over(context.map_, STARTING))
-    ]
-    if not tried:
+    sensed = [effect for effect in catalogue if place_of_effect(effect) == "sensor"]
+    tried = found.rounds[0] if found.rounds else ()
+    taken = ("backlash", RIVAL)
+    fitted = [candidate.fitted.hypothesis for candidate in tried if candidate.newest not in taken]
+    return [*candidates(sensed, evidence, context.guard.over(context.map_, STARTING)), *fitted]
+
+
+def _with_second_effect(
+    context: SearchContext, view: View, alone: BandPowerFit, seconds: Sequence[Hypothesis]
+) -> tuple[BandPowerFit, ...]:
+    """The fit of play, and where it leaves more than chance, that of play with the second effect that lowers the cost
+    most, if this takes most of what is left."""
+    comparison = comparison_of(context, alone)
+    before = comparison.score_candidate(alone.deviations, alone.hypothesis)
+    if not seconds or worst_part(before) <= EXPLAINED_BY_CHANCE:
         return (alone,)
+    tried = [evaluate_hypothesis(view, alone.deviations, combine(alone.hypothesis, each)) for each in seconds]
     both = _refine(view, min(tried, key=lambda trial: trial.cost))
     after = comparison.score_candidate(both.deviations, both.hypothesis)
-    return (alone, both) if _worst_part(after) <= (1 - IMPACTS_SHARE) * _worst_part(before) else (alone,)
-
-
-def _worst_part(candidate: FittedCandidate) -> float:
-    """The larger misfit over chance of the samples to choose by and to test, each the root mean square of channels."""
-    parts = (candidate.score.choose, candidate.score.test)
-    return max((_rms_over_channels(part) for part in parts if np.isfinite(part).any()), default=0.0)
+    return (alone, both) if worst_part(after) <= (1 - IMPACTS_SHARE) * worst_part(before) else (alone,)
 
 
 def _needs_gap(context: SearchContext, view: View, best: BandPowerFit) -> bool:
@@ -128,9 +134,9 @@ def _needs_gap(context: SearchContext, view: View, best: BandPowerFit) -> bool:
     without = fit_band_power(view, evaluate_hypothesis(view, best.deviations, hypothesis), FIRST_ROUNDS)
     if not np.isfinite(without.cost):
         return False
-    comparison = _comparison(context, best)
+    comparison = comparison_of(context, best)
     each = [comparison.score_candidate(fitted.deviations, fitted.hypothesis) for fitted in (best, without)]
-    return _is_convincing(*each)
+    return is_convincing(*each)
 
 
 def _fit_claim(view: View, evidence: Evidence, claim: Claim) -> BandPowerFit:
@@ -148,10 +154,6 @@ def _fit_claim(view: View, evidence: Evidence, claim: Claim) -> BandPowerFit:
     tried: list[BandPowerFit] = list(near.map_(at, net))  # type: ignore[arg-type]
     best = fit_band_power(near, min(tried, key=lambda trial: trial.cost), FIRST_ROUNDS) if tried else None
     return evaluate_hypothesis(view, given, NOTHING if best is None else best.hypothesis)
-
-
-def _is_model(trial: BandPowerFit) -> bool:
-    return bool(trial.hypothesis.claims) and bool(np.isfinite(trial.cost))
 
 
 def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
@@ -190,32 +192,13 @@ def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
     return np.array(list(view.map_(moved, range(len(ways)))))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Comparison:
-    """Compares candidates by band power on all samples, held-out ones included."""
-
-    context: SearchContext
-    power: BandPower
-    chance: FloatArray
-    """(c,)"""
-
-    def score_candidate(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
-        whole = evaluate_fit(self.context.whole, self.context.tuning, deviations, hypothesis)
-        off = self.power.misfits(self.power.measured - self.power.predict(whole.residuals))
-        return FittedCandidate(whole, FitScore(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
-
-    def _times(self, off: FloatArray) -> FloatArray:
-        """Misfit over chance; 1 for a channel whose bands are all below the noise."""
-        return off if np.isnan(off).all() else np.where(np.isnan(off), 1.0, off / self.chance)
-
-
 def _judge(
     context: SearchContext, found: Explanation, fits: Sequence[BandPowerFit], others: Sequence[Hypothesis]
 ) -> Explanation | None:
-    """The explanation by play, and by a sensor fault beside it where there is one; None where the re-tuned model or a
-    rival of play is as good. fits: of one more effect each."""
+    """The explanation by play, and by a second effect where there is one; None where the re-tuned model or a rival of
+    play is as good. fits: of one more effect each."""
     best = fits[-1]
-    comparison = _comparison(context, best)
+    comparison = comparison_of(context, best)
     steps = tuple(comparison.score_candidate(each.deviations, each.hypothesis) for each in fits)
     named = steps[-1]
     given = np.zeros_like(best.deviations)
@@ -233,53 +216,13 @@ def _judge(
         if candidate.fitted.hypothesis.key[-1] != fits[0].hypothesis.key[-1]
     ]
     rivals.sort(key=lambda rival: rival.score.mean_log_error)
-    if not _is_convincing(named, retuned) or any(_as_good(rival, named) for rival in rivals):
+    if not is_convincing(named, retuned) or any(is_as_good(rival, named) for rival in rivals):
         return None
     statistic = Statistic(WORDS, comparison.chance, best.errors)
     rounds = ((steps[0], *rivals), *((step,) for step in steps[1:]))
     return Explanation(before, retuned, named, rounds, steps, statistic)
 
 
-def _comparison(context: SearchContext, best: BandPowerFit) -> _Comparison:
-    power, model = BandPower(context.whole), context.tuning.tune(best.deviations)
-
-    def predict(number: int) -> FloatArray:
-        return power.predict(context.whole.residuals(model, perturb(best.hypothesis, number).placed_effects()))
-
-    first, other = (np.asarray(each) for each in context.map_(predict, range(2)))
-    differ = power.misfits(first - other)
-    chance = np.fmax(np.fmax(differ.fit, differ.choose), differ.test)
-    return _Comparison(context, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
-
-
-def _is_convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
-    pairs = [
-        (getattr(retuned.score, part), getattr(named.score, part))
-        for part in ("choose", "test")
-        if np.isfinite(getattr(named.score, part)).any()
-    ]
-    return all(
-        _rms_over_channels(left) <= (1 - IMPACTS_SHARE) * _rms_over_channels(of)
-        and _rms_over_channels(left) <= IMPACTS_ERROR
-        for of, left in pairs
-    )
-
-
-def _as_good(rival: FittedCandidate, named: FittedCandidate) -> bool:
-    ways = [(getattr(candidate.score, part) for candidate in (rival, named)) for part in ("choose", "test")]
-    return all(
-        _rms_over_channels(other) <= IMPACTS_AS_GOOD * _rms_over_channels(own)
-        for other, own in ways
-        if np.isfinite(other).any()
-    )
-
-
-def _rms_over_channels(times: FloatArray) -> float:
-    """Root mean square over the channels."""
-    return float(np.sqrt(np.nanmean(times**2)))
-
-
-# A response is irregular where repeats differ by far more than the noise or, without repeats, its residual is peaked.
 def is_irregular(context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:
     """Whether a response is irregular, as of rattling play: its periods vary by far more than the noise or, without
     repeats, a channel's residual has a kurtosis above `PEAKED_KURTOSIS`."""

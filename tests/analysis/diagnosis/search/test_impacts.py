@@ -123,6 +123,23 @@ def test_a_hum_of_the_sensor_is_named_beside_play(humming):
     assert judge(humming).verdict == "explained"
 
 
+def test_a_friction_that_the_search_tried_is_named_beside_play(diagnosed):
+    context, found, floors = searched(diagnosed, (*LOOSE, PlacedEffect(DRY, (AXIS,), {"level": 0.3})))
+    rubs = hypothesis_of_claim(Claim(DRY, "one", (AXIS,)), [{"level": 0.2}])
+    tried = context.candidate(evaluate_fit(context.measure, context.tuning, found.retuned.fitted.deviations, rubs))
+    rubbed = explain_impacts(context, replace(found, rounds=((tried,),)), floors, CATALOGUE)
+    assert [each.effect.name for each in rubbed.after.fitted.hypothesis.claims] == ["backlash", "coulomb_friction"]
+    level = rubbed.after.fitted.hypothesis.placed_effects()[-1].values["level"]
+    assert level == pytest.approx(0.3, rel=0.15)
+    assert judge(rubbed).verdict == "explained"
+
+
+def test_without_time_no_second_effect_is_looked_for(diagnosed):
+    hum = PlacedEffect(EFFECTS["mains_hum"], (0, 1), {"amplitude": 2.0, "frequency": 60.0, "phase": 1.0})
+    late = explain_impacts(*searched(diagnosed, (*LOOSE, hum)), CATALOGUE, lambda: False)
+    assert late is None or len(late.steps) == 1
+
+
 def test_beside_play_alone_no_fault_of_the_sensor_is_named(told):
     assert len(told.steps) == 1
 
