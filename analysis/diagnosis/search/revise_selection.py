@@ -49,21 +49,9 @@ def exchange_effects(
 ) -> Explanation:
     """The explanation with effects exchanged; unchanged where it reaches the noise, has a single effect, nothing fits
     better, or a law crashes."""
-    newest = found.steps[-1].newest if found.steps else ""
-
-    def exchange() -> Explanation:
-        return _exchange_each(context, found, catalogue, progress, time_left)
-
-    return context.guard.part(newest, "its exchange", exchange, found)
-
-
-def _exchange_each(
-    context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
-) -> Explanation:
     limited = replace(context, map_=limit_map(context.map_, time_left))
-    fixed = context.certain or context.references is not None or found.ended_early or found.barred
     for _ in found.steps:
-        if fixed or len(found.steps) < 2 or found.after.score.worst_channel <= SEARCH_ON or not time_left():
+        if not _may_exchange(context, found, time_left):
             break
         better = _exchange_first(limited, found, catalogue, progress)
         if better is None:
@@ -80,10 +68,20 @@ def exchange_for_refinement(
     among those that are tried, so that a refinement must gain as much as in any step."""
     first = found.steps[0].newest if found.steps else ""
     refinements = [effect for effect in catalogue if first in effect.simpler]
-    if not refinements:
+    if not refinements or not _may_exchange(context, found, time_left):
         return found
+    limited = replace(context, map_=limit_map(context.map_, time_left))
     tried = [*refinements, *(effect for effect in catalogue if effect.name == first)]
-    return exchange_effects(context, found, tried, progress, time_left)
+    better = _exchange_first(limited, found, tried, progress)
+    sites = found.steps[0].fitted.hypothesis.claims[-1].sites
+    return found if better is None or better.steps[-1].fitted.hypothesis.claims[-1].sites != sites else better
+
+
+def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBudget) -> bool:
+    """Whether there are two effects that are not fixed and leave more than noise, and time."""
+    fixed = context.certain or context.references is not None or found.ended_early or found.barred
+    more = len(found.steps) > 1 and found.after.score.worst_channel > SEARCH_ON
+    return not fixed and more and time_left()
 
 
 def _exchange_first(
@@ -91,11 +89,18 @@ def _exchange_first(
 ) -> Explanation | None:
     """The explanation with its first effect replaced by what fits better beside the others; None where nothing does."""
     step = Step("looking again for the first effect", 0.8, progress)
-    try:
-        kept = without_effect(context, found, 0)
-        tried = find_next_effect(context, catalogue, kept.steps[-1].fitted, step)
-    except OutOfTimeError:
+
+    def find() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
+        try:
+            kept = without_effect(context, found, 0)
+            return kept, find_next_effect(context, catalogue, kept.steps[-1].fitted, step)
+        except OutOfTimeError:
+            return None
+
+    looked = context.guard.part(found.steps[-1].newest, "its exchange", find, None)
+    if looked is None:
         return None
+    kept, tried = looked
     named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
     if not named or named[0] is not tried[0] or not is_worthwhile(found.steps[-1], named[0]):
         return None

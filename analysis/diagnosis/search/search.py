@@ -45,7 +45,7 @@ from analysis.diagnosis.search.verdict import (
     shares_taken,
     worth_naming,
 )
-from analysis.diagnosis.settings import EXPLAINED_ERROR, LAST_EFFECT_SHARE
+from analysis.diagnosis.settings import EXPLAINED_ERROR, LAST_EFFECT_SHARE, MOST_EFFECTS
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
@@ -194,7 +194,8 @@ def _search_with_pairs(
     beyond: Callable[[SearchResult], SearchResult],
 ) -> SearchResult:
     """The search that goes on from a first effect, where that leaves enough. alone: the explanation by it."""
-    found = add_effects(context, catalogue, alone, progress, time_left, most=2)
+    # With an effect left out, a round that brought none may not be taken up again.
+    found = add_effects(context, catalogue, alone, progress, time_left, MOST_EFFECTS if context.barred else 2)
     found = exchange_for_refinement(context, found, catalogue, progress, time_left)
     found = add_effects(context, catalogue, found, progress, time_left)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
@@ -271,7 +272,8 @@ def _exchange_and_prune(
 ) -> Explanation:
     """Exchange and backward elimination after forward selection; where they crash, nothing is named."""
     nothing = replace(found, after=found.retuned, steps=())
-    exchanged = exchange_effects(context, found, catalogue, progress, time_left)
+    refined = exchange_for_refinement(context, found, catalogue, progress, time_left)
+    exchanged = exchange_effects(context, refined, catalogue, progress, time_left)
     newest = found.steps[-1].newest if found.steps else ""
     return context.guard.part(newest, "its last look", lambda: prune(context, exchanged, time_left), nothing)
 

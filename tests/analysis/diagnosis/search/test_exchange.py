@@ -126,6 +126,21 @@ def test_a_refinement_that_adds_little_takes_no_place(arena_of):
     assert exchange_for_refinement(context, found, list(EFFECTS.values()), quiet, always) is found
 
 
+def test_a_refinement_elsewhere_takes_no_place(rubbing_and_late, monkeypatch):
+    import analysis.diagnosis.search.revise_selection as revised
+
+    plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
+    elsewhere = hypothesis_of_claim(
+        Claim(EFFECTS["asymmetric_friction"], "one", (1,)), [{"level_positive": 0.05, "level_negative": 0.12}]
+    )
+    moved = replace(
+        plain,
+        steps=(plain.steps[0], replace(plain.steps[1], fitted=replace(plain.steps[1].fitted, hypothesis=elsewhere))),
+    )
+    monkeypatch.setattr(revised, "_exchange_first", lambda *asked: moved)
+    assert exchange_for_refinement(rubbing_and_late, plain, list(EFFECTS.values()), quiet, always) is plain
+
+
 def test_a_law_without_refinements_stays(rubbing_and_late):
     plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
     none = [EFFECTS[name] for name in ("viscous_damping", "sensor_lag")]

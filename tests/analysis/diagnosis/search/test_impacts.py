@@ -10,7 +10,7 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
 from analysis.diagnosis.errors.band_power import BandPower
-from analysis.diagnosis.errors.band_power_fit import _errors, _move
+from analysis.diagnosis.errors.band_power_fit import View, _errors, _move, evaluate_hypothesis
 from analysis.diagnosis.errors.choose_measure import measure_of
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
@@ -20,7 +20,7 @@ from analysis.diagnosis.result.assemble_findings import impact_remainder
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import open_effects
-from analysis.diagnosis.search.impacts import explain_impacts, is_irregular
+from analysis.diagnosis.search.impacts import _needs_gap, explain_impacts, is_irregular
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import judge
 from equalizer.effects.backlash import EFFECT as PLAY
@@ -125,9 +125,12 @@ def test_a_hum_of_the_sensor_is_named_beside_play(humming):
 
 def test_a_friction_that_the_search_tried_is_named_beside_play(diagnosed):
     context, found, floors = searched(diagnosed, (*LOOSE, PlacedEffect(DRY, (AXIS,), {"level": 0.3})))
-    rubs = hypothesis_of_claim(Claim(DRY, "one", (AXIS,)), [{"level": 0.2}])
-    tried = context.candidate(evaluate_fit(context.measure, context.tuning, found.retuned.fitted.deviations, rubs))
-    rubbed = explain_impacts(context, replace(found, rounds=((tried,),)), floors, CATALOGUE)
+    # The wrong one was likelier where waveforms were compared, and is refuted by the powers.
+    laws = (("viscous_damping", {"damping": 2.0}), ("coulomb_friction", {"level": 0.2}))
+    claims = [hypothesis_of_claim(Claim(EFFECTS[name], "one", (AXIS,)), [values]) for name, values in laws]
+    at = found.retuned.fitted.deviations
+    tried = tuple(context.candidate(evaluate_fit(context.measure, context.tuning, at, each)) for each in claims)
+    rubbed = explain_impacts(context, replace(found, rounds=(tried,)), floors, CATALOGUE)
     assert [each.effect.name for each in rubbed.after.fitted.hypothesis.claims] == ["backlash", "coulomb_friction"]
     level = rubbed.after.fitted.hypothesis.placed_effects()[-1].values["level"]
     assert level == pytest.approx(0.3, rel=0.15)
@@ -144,7 +147,21 @@ def test_beside_play_alone_no_fault_of_the_sensor_is_named(told):
     assert len(told.steps) == 1
 
 
-def test_without_a_gap_two_bodies_that_touch_are_no_play(loose, told, monkeypatch):
+def asks_gap(real, gap_m, supposed_m):
+    """Whether a recording of two bodies with such a gap needs the supposed one."""
+    (played,) = LOOSE
+    context, *_ = searched(real, (replace(played, values={**played.values, "gap": gap_m}),))
+    view = View(BandPower(context.measure), context.tuning, map)
+    supposed = hypothesis_of_claim(Claim(PLAY, "one", (AXIS,)), [{**played.values, "gap": supposed_m}])
+    return _needs_gap(context, view, evaluate_hypothesis(view, np.zeros(len(context.tuning.names)), supposed))
+
+
+def test_two_bodies_that_touch_need_no_gap_and_play_does(diagnosed):
+    assert not asks_gap(diagnosed, 1e-9, 1e-7)
+    assert asks_gap(diagnosed, GAP_M, GAP_M)
+
+
+def test_play_that_needs_no_gap_is_not_named(loose, monkeypatch):
     monkeypatch.setattr("analysis.diagnosis.search.impacts._needs_gap", lambda *asked: False)
     assert explain_impacts(*loose, CATALOGUE) is None
 
