@@ -42,9 +42,9 @@ from study.devices.force_dimension.loop_cells import (
     WEAK,
     WITHHELD_UNTIL_S,
     check_on,
+    check_status,
     check_still,
     count_beyond_share,
-    look,
     note_sent,
     record_failure,
     record_library_failure,
@@ -103,7 +103,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     if answer < 0:
         return record_library_failure(cells, POSITION)
     if cells[READS] % LOOKS_OF in LOOKS_AT:
-        code = look(calls, cells)
+        code = check_status(calls, cells)
         if code != 0:
             return code
     cells[READS] += 1.0

@@ -33,7 +33,7 @@
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
   X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                   \
   X(answer_of_errors, -1) /* of functions that fail */ X(keeps_force, 0) /* a zero is answered and not given */                               \
-  X(silent_gain, 1) X(told_step, 0) X(told_noise, 0) /* scaled without a word; the reported force in steps, with noise (rms), N */ \
+  X(silent_gain, 1) X(told_step, 0) X(told_noise, 0) X(told_lift, 0) /* scaled without a word; the reported force in steps, with noise (rms), N; its weight held up */ \
   X(silently_n, 1e9) /* a cap of its own, of which no answer says anything */ X(turned, 0) /* force the other way */                                                                  \
   /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
   X(friction, 0) X(gain, 1) X(mode_hz, 0) X(mode_kg, 0.02)                                                             \
@@ -369,7 +369,7 @@ EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
   double *told[3] = {x_n, y_n, z_n}, step = p[told_step];
   if (p[untold] > 1) PLAIN((void)0);
   PLAIN(for (int i = 0; i < 3; i++) {
-    double said = p[gain_told] * p[fx + i] + p[told_noise] * 3.4641016 * evenly();
+    double said = p[gain_told] * p[fx + i] + (i == 2 ? p[told_lift] : 0) + p[told_noise] * 3.4641016 * evenly();
     *told[i] = step > 0 ? step * round(said / step) : said;
   });
 }
