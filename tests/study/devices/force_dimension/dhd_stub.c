@@ -43,7 +43,7 @@
   X(force_on, 0) X(brake, 1) X(cause, 0) X(fx, 0) X(fy, 0) X(fz, 0) X(peak_n, 0) X(writes, 0) X(opened, 0)             \
   X(stops, 0) X(closes, 0) X(reads, 0) X(watchdog, 0) X(cap_n, -1) X(effector, 0) X(gravity, 1) X(guard, 1)            \
   X(noise, 0) /* rms of each reading of the sensor, m/s^2 */                                                           \
-  X(expert, 0) X(resetting, 0) X(now, 0) X(ax, 0) X(ay, 0) X(az, 0) X(enables, 0) X(last_write, 0)
+  X(expert, 0) X(resetting, 0) X(now, 0) X(ax, 0) X(ay, 0) X(az, 0) X(enables, 0) X(last_write, 0) X(zeroed_s, 0) X(braked_s, 0) /* when it got the first zero, and braked */
 
 #define AS_ENUM(name, value) name,
 #define AS_VALUE(name, value) value,
@@ -144,6 +144,7 @@ static void start(void) {
 }
 
 static void drop(int cause_of_drop) {
+  if (!p[brake]) p[braked_s] = p[now];
   p[force_on] = 0, p[brake] = 1, p[cause] = cause_of_drop;
 }
 
@@ -315,7 +316,7 @@ EXPORT int dhdEnableForce(unsigned char value, char id) {
 }
 EXPORT int dhdSetBrakes(int value, char id) {
   (void)id;
-  PLAIN(p[brake] = value != 0; if (value) memset(command, 0, sizeof command));
+  PLAIN(if (value && !p[brake]) p[braked_s] = p[now]; p[brake] = value != 0; if (value) memset(command, 0, sizeof command));
 }
 EXPORT int dhdGetPosition(double *px, double *py, double *pz, char id) {
   (void)id;
@@ -354,6 +355,7 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
     if (p[turned]) share = -share;
     share *= p[silent_gain];
     if (asked > 0 || !p[keeps_force]) command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
+    if (asked == 0 && p[last_write] > 0) p[zeroed_s] = p[now];
     p[writes]++, p[last_write] = asked, last_command_s = p[now];
     if (asked > 0) device->used = 1;
     if (!p[latches] && !p[force_on] && p[cause] == 3) p[force_on] = 1, p[brake] = 0, p[cause] = 0;
