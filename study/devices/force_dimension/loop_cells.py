@@ -200,7 +200,7 @@ def _reports_forces(cells: FloatArray) -> bool:
     elif abs(cells[REPORTED + 2] - cells[LAST_Z]) > FINEST_N:
         cells[REPORTS] += 1.0
         cells[LAST_Z] = cells[REPORTED + 2]
-    return cells[REPORTS] >= ODD_FOR
+    return bool(cells[REPORTS] >= ODD_FOR)
 
 
 @part
