@@ -15,7 +15,8 @@ WATCHDOG_S = 0.03
 that stays for 30 ms moves a bare handle by a few millimetres."""
 
 MOST_DEVICES = 16
-"""Devices that are looked at on one computer. A library that counts more than that has lost count."""
+"""Devices that are looked at on one computer. A library that counts more than that has lost count, and the error of a
+device that is not among them says so."""
 
 CALIBRATE = (
     "Push the handle gently into its calibration position, as the device's manual shows (or run the vendor's "
@@ -36,7 +37,8 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
     """The first device of this kind that is free, as it is: neither armed nor taking forces. Raises `DeviceError`."""
     others: list[tuple[str, str | None]] = []
     failures: list[LibraryError] = []
-    for number in range(min(MOST_DEVICES, max(0, int(library.function("dhdGetDeviceCount")())))):
+    count = max(0, int(library.function("dhdGetDeviceCount")()))
+    for number in range(min(MOST_DEVICES, count)):
         try:
             handle = Handle(library, library.call("dhdOpenID", number))
         except LibraryError as error:
@@ -53,7 +55,11 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
             handle.let_go()
             raise
         handle.let_go()
-    raise _none_of_them(model, others, failures)
+    missing = _none_of_them(model, others, failures)
+    if count <= MOST_DEVICES:
+        raise missing
+    counted = f"The library counts {count} devices, of which the first {MOST_DEVICES} were looked at."
+    raise DeviceError(missing.title, f"{missing.happened} {counted}", missing.do_now)
 
 
 def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_kg: float | None) -> float:

@@ -18,8 +18,8 @@ from study.devices.governor.compiling import part
 from study.devices.native import SYSTEM_SIZE, Addresses, call_int, room_for_16, word
 
 ODD_FOR, ODD_SHARE = 5, 0.1
-"""Status checks with another reported force than the one that was sent, and their share, beyond which the device
-is stopped."""
+"""Status checks whose reported force is another than the one that was sent: so many beyond this share of all checks
+stop the device (`count_beyond_share`), and so many in a row after a zero."""
 
 ODD_N, ODD_PART = 0.2, 0.2
 """Difference of the two forces that an acceptance allows: N, and a share of the one that was sent."""
@@ -40,24 +40,27 @@ LIBRARY = (
 
 (
     NUMBER, CAP_N, DROPS_AFTER_S, READS, REPEATED, TOO_STRONG, PRESSED, SENT_S, SENT_ZERO, WITHHELD_UNTIL_S, CLOSED,
-    LET_GO, FAILED, OFF_CAUSE, REFUSED_N, ODD, TELLS,
-) = range(17)  # fmt: skip
+    LET_GO, FAILED, OFF_CAUSE, REFUSED_N, ODD, REPORTS, LAST_Z,
+) = range(18)  # fmt: skip
 """Cells of the driver. REPEATED, TOO_STRONG, ODD: readings, forces and status checks beyond their share, counted by
-`count_beyond_share`; PRESSED: mask of buttons; OFF_CAUSE, REFUSED_N: for the text of a failure; TELLS: 1 once the
-device has reported a force."""
+`count_beyond_share`; PRESSED: mask of buttons; OFF_CAUSE, REFUSED_N: for the text of a failure; REPORTS: status
+checks that speak for a device that reports the forces it gives (`_reports_forces`); LAST_Z: reported force along z at
+the last of them (N)."""
 
-TOLD, SENT = 17, 20
-"""First cells of the force that the device reports (x, y, z; N), and of the last `MEMORY` forces sent (the same)."""
+REPORTED, SENT = 18, 21
+"""First cells of the reported force at the last status check (x, y, z; N), and of the last `MEMORY` forces sent (the
+same)."""
 MEMORY = 3
 """Forces sent that are remembered, for the comparison with the reported force."""
 WEIGHT = SENT + 3 * MEMORY
 """Cells of the sums for the gain: number, reported force (x, y, z), its square; from LAGGED on, for each age of the
 report in ticks: sent force (x, y, z), its square, its product with the reported one."""
 LAGGED, OF_LAG = WEIGHT + 5, 5
-STILL_TOLD = LAGGED + OF_LAG * MEMORY
-STILL_ODD = STILL_TOLD + 3
-"""Force that the device reports after a zero (x, y, z; N), and how often in a row it was one."""
-CELLS_SIZE = STILL_ODD + 1
+REPORTED_AT_REST = LAGGED + OF_LAG * MEMORY
+ODD_AT_REST = REPORTED_AT_REST + 3
+"""First cell of the reported force after a zero (x, y, z; N), and the number of zeros in a row after which it was more
+than `ODD_N`."""
+CELLS_SIZE = ODD_AT_REST + 1
 
 OF_LIBRARY = 1
 """Error code of a failed call of the first function of LIBRARY; the codes of the others follow."""
@@ -129,7 +132,7 @@ def _gives_another(cells: FloatArray) -> bool:
     the horizontal part: the vertical one may hold up the device's own weight."""
     for k in range(MEMORY):
         x, y = cells[SENT + 3 * k], cells[SENT + 3 * k + 1]
-        apart = math.hypot(cells[TOLD] - x, cells[TOLD + 1] - y)
+        apart = math.hypot(cells[REPORTED] - x, cells[REPORTED + 1] - y)
         if apart <= ODD_N + ODD_PART * math.hypot(x, y):
             return False
     return True
@@ -138,18 +141,18 @@ def _gives_another(cells: FloatArray) -> bool:
 @part
 def _add_to_sums(cells: FloatArray) -> None:
     """Add the newest status check to the sums for the gain; those before lose weight."""
-    for place in range(WEIGHT, STILL_TOLD):
+    for place in range(WEIGHT, REPORTED_AT_REST):
         cells[place] *= 1.0 - 1.0 / REMEMBERED
     cells[WEIGHT] += 1.0
     for i in range(3):
-        told = cells[TOLD + i]
-        cells[WEIGHT + 1 + i] += told
-        cells[WEIGHT + 4] += told * told
+        reported = cells[REPORTED + i]
+        cells[WEIGHT + 1 + i] += reported
+        cells[WEIGHT + 4] += reported * reported
         for k in range(MEMORY):
             sent, sums = cells[SENT + 3 * k + i], LAGGED + OF_LAG * k
             cells[sums + i] += sent
             cells[sums + 3] += sent * sent
-            cells[sums + 4] += sent * told
+            cells[sums + 4] += sent * reported
 
 
 @part
@@ -157,12 +160,16 @@ def _fit_gain(cells: FloatArray, age: int) -> tuple[float, float, float]:
     """Linear regression of the reported on the sent force, with a constant (the weight that is held up), for a report
     that is so many ticks old: gain, squared residuals (N²), squared variation of the force sent (N²)."""
     n, sums = cells[WEIGHT], LAGGED + OF_LAG * age
-    told2, sent2, product = cells[WEIGHT + 4], cells[sums + 3], cells[sums + 4]
+    reported2, sent2, product = cells[WEIGHT + 4], cells[sums + 3], cells[sums + 4]
     for i in range(3):
-        told, sent = cells[WEIGHT + 1 + i], cells[sums + i]
-        told2, sent2, product = told2 - told * told / n, sent2 - sent * sent / n, product - sent * told / n
+        reported, sent = cells[WEIGHT + 1 + i], cells[sums + i]
+        reported2, sent2, product = (
+            reported2 - reported * reported / n,
+            sent2 - sent * sent / n,
+            product - sent * reported / n,
+        )
     gain = product / max(sent2, 1e-12)
-    return gain, max(0.0, told2 - gain * product) + 3.0 * n * FINEST_N * FINEST_N, sent2
+    return gain, max(0.0, reported2 - gain * product) + 3.0 * n * FINEST_N * FINEST_N, sent2
 
 
 @part
@@ -185,16 +192,26 @@ def _gain_is_off(cells: FloatArray) -> bool:
 
 
 @part
+def _reports_forces(cells: FloatArray) -> bool:
+    """Whether the device reports the forces that it gives: one along x or y, or one along z that has changed at
+    `ODD_FOR` status checks. A constant one along z may be the compensation of gravity alone."""
+    if cells[REPORTED] != 0.0 or cells[REPORTED + 1] != 0.0:
+        cells[REPORTS] = ODD_FOR
+    elif abs(cells[REPORTED + 2] - cells[LAST_Z]) > FINEST_N:
+        cells[REPORTS] += 1.0
+        cells[LAST_Z] = cells[REPORTED + 2]
+    return bool(cells[REPORTS] >= ODD_FOR)
+
+
+@part
 def _check_given(calls: Addresses, cells: FloatArray) -> int:
     """Compare the reported force with those sent. A device that never reports a force is not judged by it: its
     acceptance was refused."""
-    place = cells.ctypes.data + 8 * TOLD
+    place = cells.ctypes.data + 8 * REPORTED
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
     if call_int(calls[GIVEN], asked) < 0:
         return 0
-    if cells[TOLD] != 0.0 or cells[TOLD + 1] != 0.0:
-        cells[TELLS] = 1.0
-    if cells[TELLS] == 0.0:
+    if not _reports_forces(cells):
         return 0
     _add_to_sums(cells)
     cells[ODD] = count_beyond_share(cells[ODD], _gives_another(cells), ODD_SHARE)
@@ -203,8 +220,10 @@ def _check_given(calls: Addresses, cells: FloatArray) -> int:
 
 
 @part
-def look(calls: Addresses, cells: FloatArray) -> int:
-    """Read buttons, status and the reported force. Returns 0 or an error code."""
+def check_status(calls: Addresses, cells: FloatArray) -> int:
+    """Status check within the loop: read the buttons, the status and the reported force, and compare that with the
+    forces sent. Returns 0, or the error code of a call that failed, of a device that takes no forces (`check_on`), or
+    of a reported force that is none of those sent or another multiple of them (GIVES_ANOTHER)."""
     pressed = call_int(calls[BUTTONS], (np.int32(cells[NUMBER]),))
     if pressed < 0:  # no device has 32 buttons
         return record_library_failure(cells, BUTTONS)
@@ -217,8 +236,10 @@ def look(calls: Addresses, cells: FloatArray) -> int:
 def check_still(calls: Addresses, cells: FloatArray) -> int:
     """After a zero that was sent while nothing is played: 0, or an error code where the device says that it gives a
     force all the same, again and again."""
-    place = cells.ctypes.data + 8 * STILL_TOLD
+    place = cells.ctypes.data + 8 * REPORTED_AT_REST
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
-    told = call_int(calls[GIVEN], asked) >= 0 and math.hypot(cells[STILL_TOLD], cells[STILL_TOLD + 1]) > ODD_N
-    cells[STILL_ODD] = cells[STILL_ODD] + 1.0 if told else 0.0
-    return 0 if cells[STILL_ODD] < ODD_FOR else record_failure(cells, GIVES_ANOTHER)
+    reported = (
+        call_int(calls[GIVEN], asked) >= 0 and math.hypot(cells[REPORTED_AT_REST], cells[REPORTED_AT_REST + 1]) > ODD_N
+    )
+    cells[ODD_AT_REST] = cells[ODD_AT_REST] + 1.0 if reported else 0.0
+    return 0 if cells[ODD_AT_REST] < ODD_FOR else record_failure(cells, GIVES_ANOTHER)

@@ -42,9 +42,9 @@ from study.devices.force_dimension.loop_cells import (
     WEAK,
     WITHHELD_UNTIL_S,
     check_on,
+    check_status,
     check_still,
     count_beyond_share,
-    look,
     note_sent,
     record_failure,
     record_library_failure,
@@ -103,7 +103,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     if answer < 0:
         return record_library_failure(cells, POSITION)
     if cells[READS] % LOOKS_OF in LOOKS_AT:
-        code = look(calls, cells)
+        code = check_status(calls, cells)
         if code != 0:
             return code
     cells[READS] += 1.0
@@ -178,9 +178,12 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 @part
 def _send_zero(calls: Addresses, cells: FloatArray) -> int:
+    """Send a zero force; brake where the library answers anything but success or a notice (STALE, SCALED)."""
     began_s = now_s(calls)
-    if _set_force(calls, cells, 0.0, 0.0, 0.0) < 0:
-        return record_library_failure(cells, FORCE)
+    if not 0 <= _set_force(calls, cells, 0.0, 0.0, 0.0) <= SCALED:
+        code = record_library_failure(cells, FORCE)
+        _brake(calls, cells)  # the device may give the force before still
+        return code
     if cells[SENT_ZERO] == 0.0 and _is_silent(calls, cells):
         # A force was cut off: its call may hang still, and must find a device that takes none.
         code = check_on(calls, cells)
@@ -238,8 +241,8 @@ def _rest(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray
         code = _send_force(calls, cells, force)
         if code == 0:
             code = check_still(calls, cells)
-            if code != 0:
-                _brake(calls, cells)
+        if code != 0:
+            _brake(calls, cells)
     release(calls)
     return code
 

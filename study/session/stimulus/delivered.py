@@ -13,8 +13,8 @@ HIGHEST_HARMONIC = 5
 """Highest harmonic, as for acceleration ellipses: a mechanism transmits little beyond it."""
 
 STIFFEST_N_PER_M, STRONGEST_DAMPING_N_S_PER_M, HEAVIEST_KG = 2000.0, 30.0, 3.0
-"""Assumed upper limits of handle and hand together: more than four times a whole arm (135 N/m, 6.5 N s/m, 0.55 kg by
-Sci. Rep. srep18004)."""
+"""Assumed upper limits of the hand: more than four times a whole arm (135 N/m, 6.5 N s/m, 0.55 kg by Sci. Rep.
+srep18004). The device's own mass is added."""
 
 LEAST_MPS2 = 0.1
 """Where even less may arrive, a sensor's noise could hide it: nothing is said then."""
@@ -50,14 +50,17 @@ def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_h
     )
 
 
-def hardly_arrived(recording: Recording, unit_vector: FloatArray, frequency_hz: float, friction_n: float) -> bool:
+def hardly_arrived(
+    recording: Recording, unit_vector: FloatArray, frequency_hz: float, friction_n: float, device_kg: float
+) -> bool:
     """Whether the acceleration along the direction is less than the stiffest, heaviest hand leaves of the force sent:
-    motors that do nothing, a blocked handle, a dead sensor. friction_n: force that may move nothing. Both are fitted at
-    the stimulus frequency; the recording has at least one period, as for `measure_delivered`."""
+    motors that do nothing, a blocked handle, a dead sensor, or an antiresonance at this frequency. friction_n: force
+    that may move nothing; device_kg: effective mass of the device without a hand. Both amplitudes are fitted at the
+    stimulus frequency; the recording has at least one period, as for `measure_delivered`."""
     rate_hz, w = recording.sample_rate_hz, 2 * math.pi * frequency_hz
     force_n = abs(phasors(recording.command.samples, rate_hz, frequency_hz)[0] @ unit_vector)
     along_mps2 = abs(phasors(recording.response.samples, rate_hz, frequency_hz)[0] @ unit_vector)
-    opposed = STIFFEST_N_PER_M + STRONGEST_DAMPING_N_S_PER_M * w + HEAVIEST_KG * w**2
+    opposed = STIFFEST_N_PER_M + STRONGEST_DAMPING_N_S_PER_M * w + (HEAVIEST_KG + device_kg) * w**2
     least_mps2 = (force_n - friction_n) * w**2 / opposed
     return bool(least_mps2 >= LEAST_MPS2 and along_mps2 < least_mps2)
 

@@ -154,7 +154,8 @@ def _close(state: SessionState, present: Present, played: Played, asked: Stimulu
         return AfterTrial(state, leave=leave, void=verdict.spoiled, fault=fault)
     friction_n = state.protocol.safety.plausibility.friction_n
     measured = recording if values is not None else None
-    if measured is not None and hardly_arrived(measured, vector, present.frequency_hz, friction_n):
+    device_kg = sitting.device.info.effective_mass_kg
+    if measured is not None and hardly_arrived(measured, vector, present.frequency_hz, friction_n, device_kg):
         verdict = replace(verdict, flags=(*verdict.flags, HARDLY_ARRIVED))
     outcome = Outcome(played, values, verdict.flags, vector, verdict.measured)
     state = record(state, trial_measured(present, outcome, state, sitting), sitting)

@@ -14,7 +14,7 @@ from study.devices.safe import SafeDevice
 from study.devices.simulated.omega3 import build_omega3
 from study.devices.simulated.packing import pack_parameters
 from study.devices.simulated.parameters import Hand, Omega3Parameters
-from study.session.stimulus.delivered import hardly_arrived, measure_delivered
+from study.session.stimulus.delivered import HEAVIEST_KG, hardly_arrived, measure_delivered
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.stimulus import direction_vector
 from study.store.formats.protocol_files import read_study_protocol
@@ -24,6 +24,7 @@ PROTOCOL = read_study_protocol("direction_threshold").protocol
 VECTOR = direction_vector(TestDirections(), 1)
 LEVEL_N = 1.0
 FRICTION_N = PROTOCOL.safety.plausibility.friction_n
+DEVICE_KG = build_omega3(1, hand=True).info.effective_mass_kg
 
 
 def gripped(share: float) -> FloatArray:
@@ -83,10 +84,28 @@ def test_no_grip_is_taken_for_motors_that_do_nothing(frequency_hz, grip):
     """Not even one that is twenty times as firm."""
     for level_n, told in ((0.6, False), (3.0, True)):
         recording = recorded(frequency_hz, (grip, grip), 1, level_n)
-        assert not hardly_arrived(recording, VECTOR, frequency_hz, FRICTION_N)
+        assert not hardly_arrived(recording, VECTOR, frequency_hz, FRICTION_N, DEVICE_KG)
         response = recording.response
         still = replace(recording, response=replace(response, samples=0.02 * response.samples))
-        assert hardly_arrived(still, VECTOR, frequency_hz, FRICTION_N) is told
+        assert hardly_arrived(still, VECTOR, frequency_hz, FRICTION_N, DEVICE_KG) is told
+
+
+def moved(mass_kg: float, frequency_hz: float) -> Recording:
+    """A free mass under a sine of 3 N, after 1 s at 1 kHz."""
+    wave = 3.0 * np.sin(2 * np.pi * frequency_hz * np.arange(1000) / 1000)[:, None] * VECTOR
+    return Recording(
+        device="a free mass",
+        command=Signal(wave, 1000.0, "force", "N", ("fx", "fy", "fz")),
+        response=Signal(wave / mass_kg, 1000.0, "acceleration", "m/s^2", ("ax", "ay", "az")),
+    )
+
+
+@pytest.mark.parametrize("device_kg", [0.1, 1.0, 4.0])
+def test_a_heavy_device_in_the_heaviest_hand_is_not_taken_for_motors_that_do_nothing(device_kg):
+    """At 45 Hz, where mass opposes most: only what moves less than hand and declared mass together is told."""
+    heavy = moved(HEAVIEST_KG + device_kg, 45.0)
+    assert not hardly_arrived(heavy, VECTOR, 45.0, FRICTION_N, device_kg)
+    assert hardly_arrived(moved(2 * (HEAVIEST_KG + device_kg), 45.0), VECTOR, 45.0, FRICTION_N, device_kg)
 
 
 def test_motors_that_give_30_percent_less_look_like_a_firmer_grip():

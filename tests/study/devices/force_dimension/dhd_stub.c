@@ -33,7 +33,7 @@
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
   X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                   \
   X(answer_of_errors, -1) /* of functions that fail */ X(keeps_force, 0) /* a zero is answered and not given */                               \
-  X(silent_gain, 1) X(told_step, 0) X(told_noise, 0) /* scaled without a word; the reported force in steps, with noise (rms), N */ \
+  X(silent_gain, 1) X(told_step, 0) X(told_noise, 0) X(told_lift, 0) /* scaled without a word; the reported force in steps, with noise (rms), N; its weight held up */ \
   X(silently_n, 1e9) /* a cap of its own, of which no answer says anything */ X(turned, 0) /* force the other way */                                                                  \
   /* What wears: Coulomb friction in N, amplifiers, a mass that swings on the handle. */                               \
   X(friction, 0) X(gain, 1) X(mode_hz, 0) X(mode_kg, 0.02)                                                             \
@@ -43,7 +43,7 @@
   X(force_on, 0) X(brake, 1) X(cause, 0) X(fx, 0) X(fy, 0) X(fz, 0) X(peak_n, 0) X(writes, 0) X(opened, 0)             \
   X(stops, 0) X(closes, 0) X(reads, 0) X(watchdog, 0) X(cap_n, -1) X(effector, 0) X(gravity, 1) X(guard, 1)            \
   X(noise, 0) /* rms of each reading of the sensor, m/s^2 */                                                           \
-  X(expert, 0) X(resetting, 0) X(now, 0) X(ax, 0) X(ay, 0) X(az, 0) X(enables, 0) X(last_write, 0)
+  X(expert, 0) X(resetting, 0) X(now, 0) X(ax, 0) X(ay, 0) X(az, 0) X(enables, 0) X(last_write, 0) X(zeroed_s, 0) X(braked_s, 0) /* when it got the first zero, and braked */
 
 #define AS_ENUM(name, value) name,
 #define AS_VALUE(name, value) value,
@@ -144,6 +144,7 @@ static void start(void) {
 }
 
 static void drop(int cause_of_drop) {
+  if (!p[brake]) p[braked_s] = p[now];
   p[force_on] = 0, p[brake] = 1, p[cause] = cause_of_drop;
 }
 
@@ -315,7 +316,7 @@ EXPORT int dhdEnableForce(unsigned char value, char id) {
 }
 EXPORT int dhdSetBrakes(int value, char id) {
   (void)id;
-  PLAIN(p[brake] = value != 0; if (value) memset(command, 0, sizeof command));
+  PLAIN(if (value && !p[brake]) p[braked_s] = p[now]; p[brake] = value != 0; if (value) memset(command, 0, sizeof command));
 }
 EXPORT int dhdGetPosition(double *px, double *py, double *pz, char id) {
   (void)id;
@@ -354,6 +355,7 @@ EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
     if (p[turned]) share = -share;
     share *= p[silent_gain];
     if (asked > 0 || !p[keeps_force]) command[0] = share * x_n, command[1] = share * y_n, command[2] = share * z_n;
+    if (asked == 0 && p[last_write] > 0) p[zeroed_s] = p[now];
     p[writes]++, p[last_write] = asked, last_command_s = p[now];
     if (asked > 0) device->used = 1;
     if (!p[latches] && !p[force_on] && p[cause] == 3) p[force_on] = 1, p[brake] = 0, p[cause] = 0;
@@ -369,7 +371,7 @@ EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
   double *told[3] = {x_n, y_n, z_n}, step = p[told_step];
   if (p[untold] > 1) PLAIN((void)0);
   PLAIN(for (int i = 0; i < 3; i++) {
-    double said = p[gain_told] * p[fx + i] + p[told_noise] * 3.4641016 * evenly();
+    double said = p[gain_told] * p[fx + i] + (i == 2 ? p[told_lift] : 0) + p[told_noise] * 3.4641016 * evenly();
     *told[i] = step > 0 ? step * round(said / step) : said;
   });
 }

@@ -4,11 +4,14 @@ force goes or the trial is void, and nothing is sent beyond the cap."""
 import contextlib
 import time
 
+import numpy as np
 import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
+from study.devices.force_dimension.tick_io import rest_once
 from study.devices.safe import SafeDevice
+from study.errors import DeviceError
 from study.session.stimulus.timing_verdict import LATE_SHARE
 
 
@@ -120,3 +123,28 @@ def test_a_write_that_hangs_leaves_the_force_to_the_watchdog(stub, rigs):
         assert not stub.applied_n.any()
         device.release()
     assert stub.safe
+
+
+@pytest.mark.parametrize("answer", [-1, -2147483647, 3])
+def test_a_zero_that_is_answered_with_an_error_is_followed_by_the_brakes(stepped_stub, answer):
+    """The device may give the force before for as long as its watchdog lets it."""
+    stepped_stub.set("answer_of_errors", answer)
+    with contextlib.closing(stepped_stub.rig()) as rig:
+        rig.write(np.array([1.0, 0.0, 0.0]))
+        stepped_stub.fail("dhdSetForce", 7)
+        with pytest.raises(DeviceError, match="dhdSetForce: timeout"):
+            rig.write(np.zeros(3))
+        stepped_stub.advance(0.001)
+        assert stepped_stub.safe
+
+
+def test_a_repeated_zero_that_is_answered_with_an_error_is_followed_by_the_brakes(stepped_stub):
+    stepped_stub.set("keeps_force", 1)
+    with contextlib.closing(stepped_stub.rig()) as rig:
+        rig.write(np.array([1.0, 0.0, 0.0]))
+        rig.write(np.zeros(3))
+        assert stepped_stub.applied_n.any()
+        stepped_stub.fail("dhdSetForce", 7)
+        assert rest_once(rig.halves.calls, rig.halves.cells, 0.0, np.zeros(3)) != 0
+        stepped_stub.advance(0.001)
+        assert stepped_stub.safe

@@ -1,12 +1,14 @@
 """The gain of the force that a device reports, against trials of all kinds whose report is late, rounded, noisy and
 off by a constant: true gains near 1 are never suspected, others soon are."""
 
+import contextlib
+
 import numpy as np
 import pytest
 from numba import njit
 
 from study.devices.force_dimension import loop_cells
-from study.devices.force_dimension.loop_cells import CELLS_SIZE, MEMORY, TOLD
+from study.devices.force_dimension.loop_cells import CELLS_SIZE, GIVES_ANOTHER, MEMORY, REPORTED, check_status
 from study.devices.force_dimension.tick_io import LOOKS_AT, LOOKS_OF
 
 AMPLITUDES_N = (0.2, 0.25, 0.3, 0.5, 1.0, 1.9, 3.0)
@@ -23,7 +25,7 @@ def suspected_after(force, told):
     cells = np.zeros(CELLS_SIZE)
     for tick in range(force.shape[0]):
         if tick % LOOKS_OF in LOOKS_AT:
-            cells[TOLD : TOLD + 3] = told[tick]
+            cells[REPORTED : REPORTED + 3] = told[tick]
             add_to_sums(cells)
             if gain_is_off(cells):
                 return tick
@@ -60,3 +62,32 @@ def test_a_gain_that_is_off_by_30_percent_is_suspected_in_the_first_trial(age, g
     for _ in range(100):
         drawn = draw_trials(random, gain, age, 0.02, 0.02, random.choice(AMPLITUDES_N[2:]), seconds=20)
         assert 0 < suspected_after(*drawn) < 2500
+
+
+def status_checks(stepped_stub, axis: int, amplitude_n: float) -> int:
+    """The first error code of the status checks while a trial of 2.5 s is played along this axis alone; else 0."""
+    with contextlib.closing(stepped_stub.rig()) as rig:
+        calls, cells = rig.halves.calls, rig.halves.cells
+        for tick in range(2500):
+            if tick % LOOKS_OF in LOOKS_AT:
+                code: int = check_status(calls, cells)
+                if code:
+                    return code
+            force_n = np.zeros(3)
+            force_n[axis] = amplitude_n * np.sin(2 * np.pi * 25 * tick / 1000)
+            rig.write(force_n)
+    return 0
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize(("gain", "code"), [(0.7, GIVES_ANOTHER), (1.0, 0), (1.3, GIVES_ANOTHER)])
+def test_a_device_that_is_driven_along_an_axis_alone_is_judged_by_its_report(stepped_stub, axis, gain, code):
+    stepped_stub.set("told_lift", 0.5)
+    stepped_stub.set("silent_gain", gain)
+    assert status_checks(stepped_stub, axis, 0.3) == code
+
+
+def test_a_device_that_reports_its_weight_alone_is_not_judged_by_it(stepped_stub):
+    stepped_stub.set("told_lift", 0.5)
+    stepped_stub.set("gain_told", 0.0)
+    assert status_checks(stepped_stub, 2, 1.0) == 0
