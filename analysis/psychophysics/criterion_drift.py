@@ -97,7 +97,8 @@ def _drift(points: Sequence[_Point], shared: float, all_freedom: int) -> Criteri
 
 
 def _p(z: float, dispersion: float, freedom: int) -> float:
-    """Two-sided; a dispersion of 1 or less counts as 1, which is no estimate."""
+    """Two-sided; a dispersion of 1 or less counts as 1, which is no estimate. Not continuous there: Student's test
+    throughout would name far fewer of the drifts (docs/statistics.md)."""
     if dispersion <= 1.0:
         return 2.0 * NormalDist().cdf(-abs(z))
     return float(2.0 * student.sf(abs(z) / math.sqrt(dispersion), freedom))

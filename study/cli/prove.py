@@ -39,7 +39,7 @@ def prove(
 
     Writes proof.json, proof.csv and report.html. Interrupted, the same command goes on.
     """
-    from study.evaluation.bank.proof_summary import proof_lines, summary
+    from study.evaluation.bank.proof_summary import blind_test_lines, summary
     from study.evaluation.bank.prove import prove as proved
     from study.evaluation.bank.seal_cases import BankPlan
     from study.evaluation.bank.sealed_bank import BankOptions
@@ -51,22 +51,22 @@ def prove(
         if laws:
             _prove_laws(out, plan, options, table, as_json)
             return
-        proof = _with_steps(lambda on_step: proved(out, plan, options, on_step))
-    write_proof(proof)
+        done = _with_steps(lambda on_step: proved(out, plan, options, on_step))
+    write_proof(done)
     if table is not None:
-        write_table(table, proof)
-    typer.echo(json.dumps(summary(proof), indent=2) if as_json else "\n".join(proof_lines(proof)))
+        write_table(table, done)
+    typer.echo(json.dumps(summary(done), indent=2) if as_json else "\n".join(blind_test_lines(done)))
 
 
 def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path | None, as_json: bool) -> None:
     from study.evaluation.bank.laws.prove_laws import prove_laws
     from study.evaluation.bank.laws.write_laws import law_lines, law_summary, write_law_table, write_laws
 
-    proof = _with_steps(lambda on_step: prove_laws(out, plan, options, on_step))
-    write_laws(proof)
+    done = _with_steps(lambda on_step: prove_laws(out, plan, options, on_step))
+    write_laws(done)
     if table is not None:
-        write_law_table(table, proof)
-    typer.echo(law_summary(proof) if as_json else "\n".join(law_lines(proof)))
+        write_law_table(table, done)
+    typer.echo(law_summary(done) if as_json else "\n".join(law_lines(done)))
 
 
 def _with_steps(run: Callable[[Callable[[str, int, int], None]], Found]) -> Found:

@@ -17,12 +17,14 @@ from study.errors import StudyError
 if TYPE_CHECKING:
     from distributed import Client
 
-PATIENCE_S = 10.0
+SCHEDULER_TIMEOUT_S = 10.0
 """Timeout in seconds for the scheduler to answer."""
-WITHOUT_WORKERS_S = 60.0
-"""Longest time in seconds that work waits at a scheduler without any worker, which may be starting anew."""
-GLANCE_S = 1.0
+WORKER_TIMEOUT_S = 60.0
+"""Longest time in seconds that work waits without any worker, or for a scheduler that names none: either may be
+starting anew."""
+POLL_S = 1.0
 """Interval in seconds at which the workers are counted."""
+KEPT = "What was finished is kept."
 INSTALL = "pip install 'hapteq[cluster]'"
 
 
@@ -32,7 +34,8 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
     one_thread: refuse workers that do several pieces at once, for work that draws figures or measures processor time.
 
     Raises StudyError where no scheduler answers, it has no workers, a worker has another version, or, later, where
-    the scheduler is lost, workers die at the same piece again and again, or none is left for `WITHOUT_WORKERS_S`.
+    the scheduler is lost, workers die at the same piece again and again, or for `WORKER_TIMEOUT_S` none is left or
+    the scheduler does not answer.
     """
     try:
         import dask
@@ -46,7 +49,7 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
             saved="Nothing was begun.",
         ) from missing
     try:
-        client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+        client = Client(address, timeout=SCHEDULER_TIMEOUT_S, set_as_default=False)
     except (OSError, ValueError) as problem:
         raise StudyError(
             "The scheduler does not answer",
@@ -57,18 +60,18 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
     # A recording is sent to its worker as a value; distributed warns against such large arguments.
     with client, dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 GB"}):
         _require_workers(client, address, one_thread)
-        lone = threading.Event()
+        causes: list[StudyError] = []
         try:
-            with _executor(client) as executor, _watch(client, executor, lone):
+            with _executor(client) as executor, _watch(client, executor, address, causes):
                 yield executor
         except (KilledWorker, CommClosedError, CancelledError) as problem:
-            raise _undone_error(problem, address, lone) from problem
+            raise causes[0] if causes else _undone_error(problem) from problem
         except (RuntimeError, TypeError, ValueError) as problem:
             # A future that is lost with its scheduler has no result, and distributed's executor fails on unpacking it;
             # one that was given up for want of workers takes no more work.
-            if client.status == "running" and not lone.is_set():
+            if client.status == "running" and not causes:
                 raise
-            raise _undone_error(problem, address, lone) from problem
+            raise causes[0] if causes else _undone_error(problem) from problem
 
 
 @contextmanager
@@ -83,47 +86,66 @@ def _executor(client: "Client") -> Iterator[Executor]:
 
 
 @contextmanager
-def _watch(client: "Client", executor: Executor, lone: threading.Event) -> Iterator[None]:
-    """Cancel all work, and set `lone`, where there were no workers for `WITHOUT_WORKERS_S`."""
+def _watch(client: "Client", executor: Executor, address: str, causes: list[StudyError]) -> Iterator[None]:
+    """Cancel all work, and append why to `causes`, where no worker was seen for `WORKER_TIMEOUT_S`."""
     left = threading.Event()
-    watcher = threading.Thread(target=partial(_await_lone, client, executor, lone, left), daemon=True)
+    watcher = threading.Thread(target=partial(_await_loss, client, executor, address, causes, left), daemon=True)
     watcher.start()
     try:
         yield
     finally:
         left.set()
-        watcher.join()
+        watcher.join(POLL_S)  # it may still wait for a scheduler that does not answer, and does nothing after that
 
 
-def _await_lone(client: "Client", executor: Executor, lone: threading.Event, left: threading.Event) -> None:
+def _await_loss(
+    client: "Client", executor: Executor, address: str, causes: list[StudyError], left: threading.Event
+) -> None:
     last_seen_s = time.monotonic()
-    while not left.wait(GLANCE_S):
-        try:
-            workers = client.nthreads()
-        except (OSError, TypeError, ValueError):  # of a scheduler that is lost, which the work itself notices
-            return
+    while not left.wait(POLL_S):
+        workers, problem = _workers(client)
         if workers:
             last_seen_s = time.monotonic()
-        elif time.monotonic() - last_seen_s > WITHOUT_WORKERS_S:
-            lone.set()
-            executor.shutdown(wait=False)
+        elif time.monotonic() - last_seen_s > WORKER_TIMEOUT_S and not left.is_set():
+            causes.append(_no_workers_error(address) if problem is None else _silent_error(address, problem))
+            executor.shutdown(wait=False)  # which the scheduler need not answer
             return
 
 
-def _undone_error(problem: BaseException, address: str, lone: threading.Event) -> StudyError:
-    kept = "What was finished is kept."
-    if lone.is_set():
-        return StudyError(
-            "The cluster has no workers any more",
-            f"For {WITHOUT_WORKERS_S:g} s the scheduler at {address} had none: they ended, or cannot reach it.",
-            f"Start some: dask worker {address}. Then run the same command again: it goes on where it stopped.",
-            saved=kept,
-        )
+def _workers(client: "Client") -> tuple[int, Exception | None]:
+    """How many the scheduler names; none, and why, where it does not answer in `SCHEDULER_TIMEOUT_S`."""
+    try:
+        return len(client.nthreads(callback_timeout=SCHEDULER_TIMEOUT_S)), None
+    except Exception as problem:  # noqa: BLE001 — distributed has many for a lost scheduler, and none may end the watch
+        return 0, problem
+
+
+def _no_workers_error(address: str) -> StudyError:
+    return StudyError(
+        "The cluster has no workers any more",
+        f"For {WORKER_TIMEOUT_S:g} s the scheduler at {address} had none: they ended, or cannot reach it.",
+        f"Start some: dask worker {address}. Then run the same command again: it goes on where it stopped.",
+        saved=KEPT,
+    )
+
+
+def _silent_error(address: str, problem: Exception) -> StudyError:
+    return StudyError(
+        "The scheduler does not answer any more",
+        f"For {WORKER_TIMEOUT_S:g} s the scheduler at {address} named no worker. When last asked: "
+        f"{type(problem).__name__}: {problem}".rstrip(" :.")
+        + ".",
+        "Look at the scheduler and the network, then run the same command again: it goes on where it stopped.",
+        saved=KEPT,
+    )
+
+
+def _undone_error(problem: BaseException) -> StudyError:
     return StudyError(
         "The cluster did not do this",
         f"{type(problem).__name__}: {problem}.",
         "Look at the scheduler and its workers, then run the same command again: it goes on where it stopped.",
-        saved=kept,
+        saved=KEPT,
     )
 
 

@@ -66,60 +66,58 @@ class FigureRow:
     of: int
 
 
-def write_proof(proof: BlindTest) -> None:
+def write_proof(done: BlindTest) -> None:
     """Write document, table and page, replacing earlier ones. Raises StudyError."""
-    folder, at = proof.folder.path, answering_commit(proof)
-    score = proof.score
+    folder, at = done.folder.path, answering_commit(done)
+    score = done.score
     document = {
-        "seed": proof.plan.seed,
-        "cases": proof.plan.cases,
-        "brief": proof.plan.brief,
-        "left_out": proof.left_out,
-        "seal": proof.seal,
-        "engines": list(proof.engines),
-        "engines_beside": list(proof.beside),
+        "seed": done.plan.seed,
+        "cases": done.plan.cases,
+        "brief": done.plan.brief,
+        "left_out": done.left_out,
+        "seal": done.seal,
+        "engines": list(done.engines),
+        "engines_beside": list(done.beside),
         "commit": at,
         "figures": [asdict(figure) for figure in score.figures],
         "calibration": asdict(score.calibration),
-        "followed": [asdict(each) for each in proof.followed],
-        "controls": [asdict(control) for control in proof.controls],
+        "followed": [asdict(each) for each in done.followed],
+        "controls": [asdict(control) for control in done.controls],
         "misses": [miss.number for miss in score.misses],
     }
     write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
-    rows = [_row(outcome, outcome in score.misses) for outcome in proof.outcomes]
+    rows = [_row(outcome, outcome in score.misses) for outcome in done.outcomes]
     write_text(folder / TABLE, rows_to_csv(rows, CaseRow), overwrite=True)
-    pictures = blind_test_pictures(proof.outcomes, score.calibration)
+    pictures = blind_test_pictures(done.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
-    facts = BlindTestFacts(
-        seeds(proof), proof.seal, at, proof.engines, tuple(remarks(proof)), proof.controls, proof.followed
-    )
+    facts = BlindTestFacts(seeds(done), done.seal, at, done.engines, tuple(remarks(done)), done.controls, done.followed)
     page = render_blind_test_report(
-        proof.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, local_now()
+        done.outcomes, score, pictures, facts, {"command": " ".join(command_line(sys.argv))}, local_now()
     )
     write_text(folder / PAGE, page, overwrite=True)
 
 
-def write_table(path: Path, proof: BlindTest) -> None:
+def write_table(path: Path, done: BlindTest) -> None:
     """Write the figures and what they were measured on as a small table that can be kept beside the code. Raises
     StudyError."""
-    calibration = proof.score.calibration
+    calibration = done.score.calibration
     figures = [
-        FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in proof.score.figures
+        FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in done.score.figures
     ]
     named = sum(part.of for part in calibration.bins)
     figures.append(FigureRow("expected calibration error", calibration.error, calibration.low, calibration.high, named))
-    failed = [control.name for control in proof.controls if not control.held]
-    held = f"{len(proof.controls) - len(failed)} of {len(proof.controls)} held" if proof.controls else "not asked"
+    failed = [control.name for control in done.controls if not control.held]
+    held = f"{len(done.controls) - len(failed)} of {len(done.controls)} held" if done.controls else "not asked"
     lines = [
-        f"# {len(proof.outcomes)} cases, seeds {seeds(proof)}",
-        f"# commit {answering_commit(proof)}, code of the diagnosis {' '.join(proof.engines)}",
-        f"# follow-ups and controls by code {' '.join(proof.beside) or 'none'}",
-        f"# seal of the labels {proof.seal}",
+        f"# {len(done.outcomes)} cases, seeds {seeds(done)}",
+        f"# commit {answering_commit(done)}, code of the diagnosis {' '.join(done.engines)}",
+        f"# follow-ups and controls by code {' '.join(done.beside) or 'none'}",
+        f"# seal of the labels {done.seal}",
         f"# versions {json.dumps(versions())}",
         f"# controls {', not '.join((held, *failed))}",
     ]
     write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
-    misses = [_row(miss, True) for miss in proof.score.misses]
+    misses = [_row(miss, True) for miss in done.score.misses]
     write_text(misses_table(path), rows_to_csv(misses, CaseRow), overwrite=True)
 
 
@@ -128,19 +126,19 @@ def misses_table(path: Path) -> Path:
     return path.with_name(f"{path.stem}-misses{path.suffix}")
 
 
-def answering_commit(proof: BlindTest) -> str:
+def answering_commit(done: BlindTest) -> str:
     """The commit recorded when the answers were first written; the current one where the same code gave them."""
-    document = proof.folder.path / DOCUMENT
+    document = done.folder.path / DOCUMENT
     if document.exists():
         before = read_json(document, FORMAT, VERSION)
-        if before.get("engines") == list(proof.engines) and isinstance(before.get("commit"), str):
+        if before.get("engines") == list(done.engines) and isinstance(before.get("commit"), str):
             return str(before["commit"])
-    return commit() if proof.engines in ((), (engine_digest(),)) else "unknown: the code has changed since"
+    return commit() if done.engines in ((), (engine_digest(),)) else "unknown: the code has changed since"
 
 
-def seeds(proof: BlindTest) -> str:
+def seeds(done: BlindTest) -> str:
     """First and last seed of the cases, as text: "1 to 500"."""
-    return f"{proof.plan.seed} to {proof.plan.seed + proof.plan.cases - 1}"
+    return f"{done.plan.seed} to {done.plan.seed + done.plan.cases - 1}"
 
 
 def commit() -> str:

@@ -75,7 +75,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
 def first_model_lines(done: FirstModel) -> tuple[str, ...]:
     """Lines for the terminal: the chosen structure and why, the parameters, the residual."""
     choice, fit = done.choice, done.choice.fit
-    rows = [_row(number) for number in fit.parameters]
+    rows = [_row(each) for each in fit.parameters]
     errors = [
         f"Held-out error at {name}: {100 * error:.3g} % of the {fit.compared}"
         for name, error in zip(fit.channels, fit.held_out, strict=True)
@@ -95,9 +95,9 @@ def first_model_summary(done: FirstModel) -> dict[str, Any]:
         "structure": fit.kind,
         "reason": choice.reason,
         "numbers": [
-            {"name": number.name, "unit": number.unit, "value": number.value,
-             "ci95": None if number.half is None else [number.value - number.half, number.value + number.half]}
-            for number in fit.parameters
+            {"name": each.name, "unit": each.unit, "value": each.value,
+             "ci95": None if each.half is None else [each.value - each.half, each.value + each.half]}
+            for each in fit.parameters
         ],
         "compared": fit.compared,
         "held_out": dict(zip(fit.channels, fit.held_out, strict=True)),
@@ -107,12 +107,12 @@ def first_model_summary(done: FirstModel) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _row(number: ParameterEstimate) -> str:
-    value = typeset(f"{number.value:.4g}")
-    if number.half is None:
-        return f"  {number.name}: {value} {number.unit}"
-    low, high = (typeset(f"{number.value + sign * number.half:.4g}") for sign in (-1, 1))
-    return f"  {number.name}: {value} {number.unit} (95 %: {low} to {high})"
+def _row(estimate: ParameterEstimate) -> str:
+    value = typeset(f"{estimate.value:.4g}")
+    if estimate.half is None:
+        return f"  {estimate.name}: {value} {estimate.unit}"
+    low, high = (typeset(f"{estimate.value + sign * estimate.half:.4g}") for sign in (-1, 1))
+    return f"  {estimate.name}: {value} {estimate.unit} (95 %: {low} to {high})"
 
 
 def _parse_structure(structure: str) -> Kind | None:

@@ -1,6 +1,7 @@
 """A dask scheduler whose last worker dies: the work waits a declared time for another, then says what to do."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -47,6 +48,21 @@ def address():
 
 
 @pytest.fixture
+def scheduler():
+    """Process and address of a scheduler on loopback without workers, in a process of its own."""
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    with subprocess.Popen([*command, "--no-dashboard"], stderr=subprocess.PIPE, text=True) as process:
+        try:
+            found = next(filter(None, (re.search(r"tcp://127\.0\.0\.1:\d+", line) for line in process.stderr)))
+            rest = threading.Thread(target=process.stderr.read, daemon=True)  # a full pipe would stop it
+            rest.start()
+            yield process, found[0]
+        finally:
+            process.kill()
+        rest.join()
+
+
+@pytest.fixture
 def here(tmp_path):
     with ThreadPoolExecutor(1) as pool:
         return simulate_power(PLAN, tmp_path / "here", pool, lambda _: None)
@@ -65,7 +81,7 @@ def killing(worker, then=lambda: None):
 
 
 def test_without_workers_it_ends_in_words_and_goes_on_with_another(address, here, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "WITHOUT_WORKERS_S", 2.0)
+    monkeypatch.setattr(cluster, "WORKER_TIMEOUT_S", 2.0)
     out = tmp_path / "power"
     with (
         a_worker(address) as worker,
@@ -105,3 +121,48 @@ def test_the_wait_for_a_worker_ends_at_once_by_ctrl_c(address, tmp_path):
     with a_worker(address) as worker, pytest.raises(KeyboardInterrupt), cluster_workers(address) as pool:
         simulate_power(PLAN, tmp_path / "power", pool, killing(worker, begin))
     assert time.monotonic() - began[0] < 15.0
+
+
+def test_a_scheduler_that_stands_still_ends_the_work_in_words(scheduler, monkeypatch):
+    process, address = scheduler
+    monkeypatch.setattr(cluster, "WORKER_TIMEOUT_S", 2.0)
+    with (
+        a_worker(address),
+        pytest.raises(StudyError, match="The scheduler does not answer any more") as ended,
+        cluster_workers(address) as pool,
+    ):
+        pending = pool.submit(time.sleep, 600.0)
+        monkeypatch.setattr(cluster, "SCHEDULER_TIMEOUT_S", 1.0)
+        process.send_signal(signal.SIGSTOP)
+        began = time.monotonic()
+        pending.result()
+    assert time.monotonic() - began < 15.0
+    assert address in str(ended.value) and ended.value.saved == "What was finished is kept."
+
+
+def test_ctrl_c_ends_the_wait_for_a_scheduler_that_stands_still(scheduler):
+    process, address = scheduler
+    main = threading.main_thread().ident
+    interrupt = threading.Timer(2.0, lambda: signal.pthread_kill(main, signal.SIGINT))
+    with a_worker(address), pytest.raises(KeyboardInterrupt), cluster_workers(address) as pool:
+        pending = pool.submit(time.sleep, 600.0)
+        process.send_signal(signal.SIGSTOP)
+        began = time.monotonic()
+        interrupt.start()
+        pending.result()
+    assert time.monotonic() - began < 8.0
+
+
+def test_the_watch_outlives_a_count_that_fails_in_an_unforeseen_way(address, monkeypatch):
+    monkeypatch.setattr(cluster, "WORKER_TIMEOUT_S", 1.0)
+
+    def fail(*_, **__):
+        raise AttributeError("unforeseen")
+
+    with (
+        a_worker(address),
+        pytest.raises(StudyError, match="AttributeError: unforeseen"),
+        cluster_workers(address) as pool,
+    ):
+        monkeypatch.setattr(distributed.Client, "nthreads", fail)
+        pool.submit(time.sleep, 600.0).result()

@@ -91,7 +91,7 @@ def test_an_error_of_the_executor_is_a_lost_scheduler_only_where_one_is_lost():
 
 
 def test_no_scheduler_is_reported_and_nothing_is_begun(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(cluster, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(cluster, "SCHEDULER_TIMEOUT_S", 1.0)
     code = main(["power", "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "power"), "--subjects", "5"])
     assert code == 1
     assert "The scheduler does not answer" in capsys.readouterr().err

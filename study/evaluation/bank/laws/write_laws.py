@@ -46,61 +46,61 @@ class LawRow:
     miss: bool
 
 
-def write_laws(proof: LawBlindTest) -> None:
+def write_laws(done: LawBlindTest) -> None:
     """Write document and table, replacing earlier ones. Raises StudyError."""
     document = {
-        **_facts(proof),
+        **_facts(done),
         "commit": commit(),
         "command": " ".join(command_line(sys.argv)),
     }
-    write_json(proof.folder.path / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
-    rows = [_row(each) for each in proof.outcomes]
-    write_text(proof.folder.path / TABLE, rows_to_csv(rows, LawRow), overwrite=True)
+    write_json(done.folder.path / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
+    rows = [_row(each) for each in done.outcomes]
+    write_text(done.folder.path / TABLE, rows_to_csv(rows, LawRow), overwrite=True)
 
 
-def write_law_table(path: Path, proof: LawBlindTest) -> None:
+def write_law_table(path: Path, done: LawBlindTest) -> None:
     """Write figures and misses as a small table that can be kept beside the code. Raises StudyError."""
-    figures = [FigureRow(each.name, each.value, each.low, each.high, each.of) for each in proof.score.figures]
+    figures = [FigureRow(each.name, each.value, each.low, each.high, each.of) for each in done.score.figures]
     lines = [
-        f"# {len(proof.outcomes)} cases of laws, seeds {proof.plan.seed} to {proof.plan.seed + proof.plan.cases - 1}",
-        f"# commit {commit()}, code of the diagnosis {' '.join(proof.engines)}",
-        f"# seal of the labels {proof.seal}",
+        f"# {len(done.outcomes)} cases of laws, seeds {done.plan.seed} to {done.plan.seed + done.plan.cases - 1}",
+        f"# commit {commit()}, code of the diagnosis {' '.join(done.engines)}",
+        f"# seal of the labels {done.seal}",
     ]
     write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
-    misses = [_row(each) for each in proof.score.misses]
+    misses = [_row(each) for each in done.score.misses]
     write_text(path.with_name(f"{path.stem}-misses{path.suffix}"), rows_to_csv(misses, LawRow), overwrite=True)
 
 
-def law_lines(proof: LawBlindTest) -> Iterator[str]:
+def law_lines(done: LawBlindTest) -> Iterator[str]:
     """Result as terminal lines, misses first."""
-    yield f"{len(proof.score.misses)} misses in {len(proof.outcomes)} cases"
-    for miss in proof.score.misses:
+    yield f"{len(done.score.misses)} misses in {len(done.outcomes)} cases"
+    for miss in done.score.misses:
         truth = miss.kind if miss.truth is None else miss.truth.formula
         yield f"  {miss.number:5d} {miss.concealed or 'nothing'} ({truth}): {_answer_text(miss)}"
     yield ""
-    for figure in proof.score.figures:
+    for figure in done.score.figures:
         yield f"{figure.name:52s} {figure_text(figure)}"
-    if len(proof.engines) > 1:
-        yield f"The answers come from {len(proof.engines)} versions of the diagnosis: run the bank anew for a figure."
-    yield f"Seal of the labels (SHA-256 of labels.sha256): {proof.seal}"
-    yield f"Everything is in {proof.folder.path}"
+    if len(done.engines) > 1:
+        yield f"The answers come from {len(done.engines)} versions of the diagnosis: run the bank anew for a figure."
+    yield f"Seal of the labels (SHA-256 of labels.sha256): {done.seal}"
+    yield f"Everything is in {done.folder.path}"
 
 
-def law_summary(proof: LawBlindTest) -> str:
+def law_summary(done: LawBlindTest) -> str:
     """Result as JSON text."""
-    return json.dumps({"folder": str(proof.folder.path), **_facts(proof)}, indent=2)
+    return json.dumps({"folder": str(done.folder.path), **_facts(done)}, indent=2)
 
 
-def _facts(proof: LawBlindTest) -> dict[str, Any]:
+def _facts(done: LawBlindTest) -> dict[str, Any]:
     return {
         "of": "laws",
-        "seed": proof.plan.seed,
-        "cases": len(proof.outcomes),
-        "brief": proof.plan.brief,
-        "seal": proof.seal,
-        "engines": list(proof.engines),
-        "figures": [asdict(figure) for figure in proof.score.figures],
-        "misses": [miss.number for miss in proof.score.misses],
+        "seed": done.plan.seed,
+        "cases": len(done.outcomes),
+        "brief": done.plan.brief,
+        "seal": done.seal,
+        "engines": list(done.engines),
+        "figures": [asdict(figure) for figure in done.score.figures],
+        "misses": [miss.number for miss in done.score.misses],
     }
 
 

@@ -12,7 +12,7 @@ import pytest
 from study.errors import StudyError, UserInterruptError
 from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_answer
-from study.evaluation.bank.proof_summary import proof_lines, summary
+from study.evaluation.bank.proof_summary import blind_test_lines, summary
 from study.evaluation.bank.prove import prove, reveal_cases
 from study.evaluation.bank.seal_cases import BankPlan, drawable_cases
 from study.evaluation.bank.sealed_bank import BankOptions
@@ -42,11 +42,11 @@ def test_a_bank_is_sealed_answered_and_revealed(proof):
 
 def test_a_case_without_an_answer_is_said_and_how_to_go_on(proof):
     done, _ = proof
-    assert summary(done)["unanswered"] == 0 and not any("no answer" in line for line in proof_lines(done))
+    assert summary(done)["unanswered"] == 0 and not any("no answer" in line for line in blind_test_lines(done))
     lost = replace(done.outcomes[0], diagnosis=None, seconds=math.nan)
     missing = replace(done, outcomes=(lost, *done.outcomes[1:]))
     assert summary(missing)["unanswered"] == 1
-    assert any("1 case has no answer" in line and "same command again" in line for line in proof_lines(missing))
+    assert any("1 case has no answer" in line and "same command again" in line for line in blind_test_lines(missing))
 
 
 def test_seals_are_read_by_sha256sum_and_come_before_any_answer(proof):
@@ -119,7 +119,7 @@ def test_a_proof_leaves_a_document_a_row_per_case_and_a_small_table(proof, tmp_p
     write_proof(replace(done, engines=("another",)))
     assert json.loads((done.folder.path / "proof.json").read_text())["commit"] == "unknown: the code has changed since"
     assert document["commit"] == commit()
-    assert next(proof_lines(done)).endswith(f"misses in {len(done.outcomes)} cases")
+    assert next(blind_test_lines(done)).endswith(f"misses in {len(done.outcomes)} cases")
     assert summary(done)["cases"] == len(done.outcomes)
 
 

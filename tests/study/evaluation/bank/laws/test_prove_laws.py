@@ -58,9 +58,9 @@ def test_a_folder_of_effects_is_no_folder_of_laws(sealed):
 
 @pytest.mark.slow
 def test_no_law_is_named_that_is_not_there(tmp_path):
-    proof = prove_laws(tmp_path / "bank", BankPlan(SEED, 20, brief=True), BankOptions(), lambda what, done, of: None)
-    write_laws(proof)
-    assert json.loads((proof.folder.path / "proof.json").read_text())["of"] == "laws"
-    assert next(law_lines(proof)).endswith("misses in 20 cases")
-    assert [each.number for each in proof.outcomes if each.diagnosis is None] == []
-    assert [each.number for each in proof.outcomes if each.false_law or each.wrongly_explained] == []
+    done = prove_laws(tmp_path / "bank", BankPlan(SEED, 20, brief=True), BankOptions(), lambda what, done, of: None)
+    write_laws(done)
+    assert json.loads((done.folder.path / "proof.json").read_text())["of"] == "laws"
+    assert next(law_lines(done)).endswith("misses in 20 cases")
+    assert [each.number for each in done.outcomes if each.diagnosis is None] == []
+    assert [each.number for each in done.outcomes if each.false_law or each.wrongly_explained] == []
