@@ -20,9 +20,13 @@ SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples
 """Effects of a sensor that can be seen in its signal alone."""
 ONLY_BESIDE_CALIBRATION = (
     "the model was fitted to these recordings, and a law of the motion that the catalogue lacks may look like it; a "
-    "calibrated model, or recordings of the device in order, would tell"
+    "calibrated model, or recordings of the device without the fault, would tell"
 )
-BESIDE_RUNAWAY = "the model without it leaves more than the mean of the signal, and all that bounds it gains"
+"""Why an effect of actuator or sensor is not named beside a model that was fitted to the same recordings."""
+BESIDE_DIVERGENCE = (
+    "without it the model's error is larger than the signal: any effect that bounds the prediction lowers it"
+)
+"""Why an effect that the signal shows is not named where the model without it predicts nothing."""
 
 
 def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
@@ -55,7 +59,7 @@ def unname_doubtful_effects(result: SearchResult) -> SearchResult:
     for place in reversed(doubtful):
         gain = held_out_gain(result.context.whole, found.plain, result.context.with_test_score(found.steps[place]))
         if gain is not None and gain.gain > 0:
-            why_not = BESIDE_RUNAWAY if found.steps[place].newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
+            why_not = BESIDE_DIVERGENCE if found.steps[place].newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
             demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, why_not))
         found = without_effect(result.context, found, place)
     if not doubtful:

@@ -71,11 +71,11 @@ class Guard:
         doing: str,
         work: Callable[[], Result],
         instead: Result,
-        answers: tuple[type[Exception], ...] = (),
+        passed_on: tuple[type[Exception], ...] = (),
     ) -> Result:
-        """The result of a piece of work, or `instead` where it crashes. what: an effect's name, or words. answers:
-        exceptions that say something to a user, and are raised."""
-        found = _try(what, doing, work, answers) if self.on else (work(),)
+        """The result of a piece of work, or `instead` where it crashes. what: an effect's name, or words. passed_on:
+        exceptions that are meant for the user, and are raised."""
+        found = _try(what, doing, work, passed_on) if self.on else (work(),)
         if isinstance(found, Crash):
             self.crashes.append(found)
             return instead
@@ -101,14 +101,14 @@ class Guard:
 
 
 def _try(
-    what: str, doing: str, work: Callable[[], Result], answers: tuple[type[Exception], ...] = ()
+    what: str, doing: str, work: Callable[[], Result], passed_on: tuple[type[Exception], ...] = ()
 ) -> tuple[Result] | Crash:
     try:
         return (work(),)
     except OutOfTimeError:
         raise
     except Exception as crash:
-        if isinstance(crash, answers):
+        if isinstance(crash, passed_on):
             raise
         return Crash(what, doing, f"{type(crash).__name__}: {crash}".rstrip(": ."))
 

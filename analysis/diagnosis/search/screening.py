@@ -1,4 +1,13 @@
-"""Ranks hypotheses by the gain that a linear model about their starting values predicts, one simulation each."""
+"""Ranks hypotheses by the gain that a linear model about their starting values predicts, one simulation each.
+
+With e the errors of the base and c the change of the prediction at a hypothesis's starting values, the error of a fit
+is taken to be e - S d - c s, linear in d, the change of the model's own parameters (sensitivity S), and in s, a factor
+on the hypothesis's effect. The step z = (d, s) that minimises |e - S d - c s|² + |d0 + d|² within its bounds removes
+
+    2 z'g - z'P z        P = [[S'S + I, S'c], [c'S, c'c]],   g = (S'e - d0, c'e),   d0 the base's deviations
+
+from the cost's sum (Draper and Smith, Applied Regression Analysis, 1998, ch. 6: extra sum of squares).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +27,7 @@ class ScreenedHypothesis:
     """A hypothesis with the cost that the linear model predicts for its fit."""
 
     hypothesis: Hypothesis
-    """Together with what is already held to be true."""
+    """The suggested effect together with those that are held already."""
     cost: float
     """`Fitted.cost` predicted by linearisation at the starting values."""
 
@@ -46,6 +55,8 @@ def screen(
 
 
 def _predicted_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray) -> float:
+    """Predicted `Fitted.cost`; infinite where the simulation diverged or does not change. errors, change: (samples,)
+    in units of the noise, e and c of the theory of operation."""
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
         strength = float(change @ change)
     if not (np.isfinite(strength) and strength > 0):

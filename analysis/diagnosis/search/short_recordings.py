@@ -42,8 +42,8 @@ Places = npt.NDArray[np.int64]
 
 
 COARSER = 2
-"""Times that simulation steps are longer where laws are only ranked, and their fits begun: a step's error stays far
-below that of the straight line by which gains are foreseen."""
+"""Factor on the simulation step where laws are only ranked and their fits begun. The integration error stays far below
+that of the linearisation that predicts gains."""
 
 
 def coarsen(measure: ErrorMeasure) -> ErrorMeasure:
@@ -53,12 +53,14 @@ def coarsen(measure: ErrorMeasure) -> ErrorMeasure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cut:
+    """Which samples of one record are kept, fitted, and repeats of others."""
+
     kept: Places
-    """Samples of one record."""
+    """Samples that are simulated: those to fit with the run-in before them."""
     fit: Mask
     """(n,): samples to fit among all of the record."""
-    instead: Places
-    """(n,): for each sample, the fitted one of which it is a repeat."""
+    repeat_of: Places
+    """(n,): for each sample, the fitted sample of which it is a repeat; itself where it is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,29 +71,30 @@ class ShortRecordings:
     """Context whose measure holds the kept samples alone: the samples to fit are also those to choose by."""
     kept: tuple[np.ndarray, ...]
     """Per record of the long measure that has any, the samples that are kept."""
-    stands_in: Places
-    """(samples to fit of the long measure,): which of the kept samples to fit stands for each."""
-    same: Places
-    """(kept samples to fit,): their places among the samples to fit of the long measure."""
+    fitted_sample: Places
+    """(samples to fit of the long measure,): for each, the kept sample to fit of which it is a repeat."""
+    place: Places
+    """(kept samples to fit,): their indices among the samples to fit of the long measure."""
     whole: ErrorMeasure
     """The long measure."""
 
-    def agrees(self, held: Fitted) -> bool:
-        """Whether the kept samples have nearly the errors that they have on the whole. held: fitted on the whole."""
+    def has_same_errors(self, held: Fitted) -> bool:
+        """Whether the kept samples have nearly the errors that they have in the simulation of all samples: the mean
+        square difference is at most `RUN_IN_ERROR` times the cost. held: fitted on all samples."""
         short, tuning = self.context.measure, self.context.tuning
         here = evaluate_fit(short, tuning, held.deviations, held.hypothesis)
-        there = residuals_to_fit(self.whole, held.residuals).reshape(len(self.stands_in), -1)[self.same]
-        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that ran away
+        there = residuals_to_fit(self.whole, held.residuals).reshape(len(self.fitted_sample), -1)[self.place]
+        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
             apart = residuals_to_fit(short, here.residuals) - there.ravel()
             return float(np.mean(apart**2)) <= RUN_IN_ERROR * held.cost
 
     def repeat_sensitivity(self, known: Sensitivity) -> Sensitivity:
         """The sensitivity on the long measure, from that on one period of each segment."""
-        times = np.sqrt(np.bincount(self.stands_in, minlength=self._samples)).repeat(
+        times = np.sqrt(np.bincount(self.fitted_sample, minlength=self._samples)).repeat(
             known.columns.shape[1] // self._samples
         )
         weighed = known.columns * times
-        return Sensitivity(known.at, known.columns, weighed @ weighed.T, self.stands_in)
+        return Sensitivity(known.at, known.columns, weighed @ weighed.T, self.fitted_sample)
 
     @property
     def _samples(self) -> int:
@@ -117,9 +120,9 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
     """The shortened recordings; None where little would be saved, where held effects depend on sampling times, and
     where the first record, of which evidence is taken, has nothing to fit. held: fitted on the whole.
 
-    A force with a memory (dry friction, play) may remember what was cut out for longer than the linear model rings:
-    each piece begins with the positions and velocities that the whole simulation has there (what forces remember goes
-    on from the piece before), and the run-in is doubled until the shortened recordings show the errors of the whole.
+    A force with a memory (dry friction, play) may depend on samples that were cut out for longer than the linear
+    model's transients last: each piece begins with the positions and velocities that the simulation of all samples has
+    there (states of the forces continue from the piece before), and the run-in is doubled until the errors agree.
     """
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
@@ -128,17 +131,17 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
     if any(each.effect.of_time for each in (*measure.known, *placed)):
         return None
     remembers = any(isinstance(each.effect.acts, (AxisForce, JointForce)) for each in (*measure.known, *placed))
-    before_s, behind_s = _run_in_s(measure, context.tuning.model)
+    before_s, after_s = _run_in_s(measure, context.tuning.model)
     periods, kept = [_last_periods(record) for record in measure.records], -1
-    while (short := _shorten(context, measure, periods, (before_s, behind_s))) is not None:
+    while (short := _shorten(context, measure, periods, (before_s, after_s))) is not None:
         if remembers and isinstance(measure, FreeSimulation):
             short = _continue_from(short, measure, held)
-        if not remembers or short.agrees(held):
+        if not remembers or short.has_same_errors(held):
             return short
-        # A simulation that ran away agrees with none, and all that lies before what is fitted may be kept already.
+        # A diverged simulation never agrees, and all samples before those to fit may be kept already.
         if (now := sum(map(len, short.kept))) == kept:
             return None
-        kept, before_s, behind_s = now, 2 * before_s, 2 * behind_s
+        kept, before_s, after_s = now, 2 * before_s, 2 * after_s
     return None
 
 
@@ -148,17 +151,18 @@ def _shorten(
     periods: Sequence[tuple[Mask, Places]],
     around_s: tuple[float, float],
 ) -> ShortRecordings | None:
+    """The recordings shortened to the given periods; None where that saves little. around_s: as for `_cut`."""
     cut = [_cut(record, each, around_s) for record, each in zip(measure.records, periods, strict=True)]
     before = sum(len(record.command) for record in measure.records)
     if not len(cut[0].kept) or sum(len(each.kept) for each in cut) > SHORT_SHARE * before:
         return None
-    short = _cut_in_pieces(measure, cut) if isinstance(measure, PredictedForce) else _splice(measure, cut)
+    short = _cut_in_pieces(measure, cut) if isinstance(measure, PredictedForce) else _join_pieces(measure, cut)
     if short is None:
         return None
     fitted = np.concatenate([each.fit[record.fit] for record, each in zip(measure.records, cut, strict=True)])
     kept = tuple(each.kept for each in cut if len(each.kept))
     return ShortRecordings(
-        replace(context, measure=short), kept, _replacements(measure, cut), np.flatnonzero(fitted), measure
+        replace(context, measure=short), kept, _index_fitted(measure, cut), np.flatnonzero(fitted), measure
     )
 
 
@@ -174,10 +178,11 @@ def _continue_from(short: ShortRecordings, measure: FreeSimulation, held: Fitted
     return replace(short, context=replace(short.context, measure=joined))
 
 
-def _replacements(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
+def _index_fitted(measure: ErrorMeasure, cut: Sequence[_Cut]) -> Places:
+    """`ShortRecordings.fitted_sample`: indices over the kept samples to fit of all records."""
     found, before = [], 0
     for record, each in zip(measure.records, cut, strict=True):
-        found.append(before + (np.cumsum(each.fit) - 1)[each.instead[record.fit]])
+        found.append(before + (np.cumsum(each.fit) - 1)[each.repeat_of[record.fit]])
         before += int(each.fit.sum())
     return np.concatenate(found)
 
@@ -193,31 +198,34 @@ def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) 
 
 
 def _last_periods(record: Observed) -> tuple[Mask, Places]:
-    """`fit` and `instead` of a `_Cut`: of each settled segment the last period."""
-    fit, instead = record.fit.copy(), np.arange(len(record.fit))
+    """`fit` and `repeat_of` of a `_Cut`: of each settled segment the last period is fitted."""
+    fit, repeat_of = record.fit.copy(), np.arange(len(record.fit))
     for periods in settled_periods(record.recording):
         inside = slice(periods.segment.start, periods.segment.stop)
         last = slice(periods.starts[-1], periods.starts[-1] + periods.length)
         if periods.settled and fit[inside].any() and last.stop <= len(fit) and record.fit[last].all():
             fit[inside] = False
             fit[last] = True
-            instead[inside] = last.start + (instead[inside] - last.start) % periods.length
-    return fit, instead
+            repeat_of[inside] = last.start + (repeat_of[inside] - last.start) % periods.length
+    return fit, repeat_of
 
 
 def _cut(record: Observed, periods: tuple[Mask, Places], around_s: tuple[float, float]) -> _Cut:
-    fit, instead = periods
-    before, behind = (int(np.ceil(min(s * record.recording.sample_rate_hz, len(fit)))) for s in around_s)
+    """The samples to fit with their run-in. around_s: seconds that are kept before and after each stretch to fit."""
+    fit, repeat_of = periods
+    before, after = (int(np.ceil(min(s * record.recording.sample_rate_hz, len(fit)))) for s in around_s)
     needed, edges = fit.copy(), np.diff(np.concatenate([[0], fit.astype(np.int8), [0]]))
     for start, stop in zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True):
-        needed[max(start - before, 0) : stop + behind] = True
-    return _Cut(np.flatnonzero(needed), fit, instead)
+        needed[max(start - before, 0) : stop + after] = True
+    return _Cut(np.flatnonzero(needed), fit, repeat_of)
 
 
-def _splice(measure: FreeSimulation, cut: Sequence[_Cut]) -> FreeSimulation:
+def _join_pieces(measure: FreeSimulation, cut: Sequence[_Cut]) -> FreeSimulation:
     """The measure on the kept samples, joined end to end."""
     pairs = zip(measure.records, cut, strict=True)
-    return measure.with_records(tuple(_piece(record, each.kept, each.fit) for record, each in pairs if len(each.kept)))
+    return measure.with_records(
+        tuple(_cut_record(record, each.kept, each.fit) for record, each in pairs if len(each.kept))
+    )
 
 
 def _cut_in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedForce | None:
@@ -227,7 +235,7 @@ def _cut_in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedFor
     for record, motion, each in zip(measure.records, measure.motions, cut, strict=True):
         driven = np.abs(record.command).max(axis=0) > 0
         for kept in np.split(each.kept, np.flatnonzero(np.diff(each.kept) > 1) + 1):
-            piece = _piece(record, kept, each.fit)
+            piece = _cut_record(record, kept, each.fit)
             if not len(kept) or (driven & (np.abs(piece.command).max(axis=0) == 0)).any():
                 return None
             records.append(piece)
@@ -235,9 +243,10 @@ def _cut_in_pieces(measure: PredictedForce, cut: Sequence[_Cut]) -> PredictedFor
     return replace(measure, records=tuple(records), motions=tuple(motions))
 
 
-def _piece(record: Observed, kept: Places, fit: Mask) -> Observed:
-    sealed = np.zeros(len(kept), dtype=np.bool_)
-    return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], sealed)
+def _cut_record(record: Observed, kept: Places, fit: Mask) -> Observed:
+    """A record of the kept samples alone. Samples to fit are those to choose by; none is held out."""
+    held_out = np.zeros(len(kept), dtype=np.bool_)
+    return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], held_out)
 
 
 def fits_on_short_recordings(
@@ -248,8 +257,8 @@ def fits_on_short_recordings(
     timed: Sequence[Hypothesis],
 ) -> list[Fitted]:
     """First fits on all samples, the best first, screened on short recordings. timed: hypotheses that depend on
-    sampling times, which short recordings cannot judge: they are fitted where the share that they promise of the cost
-    is not far below that of the others."""
+    sampling times, which short recordings cannot judge: they are fitted where the share of the cost that they are
+    predicted to remove is not far below that of the others."""
     short, guard = replace(short_form.context, measure=coarsen(short_form.context.measure)), context.guard
     begun = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
     known = sensitivity_at(short, base.deviations, base.hypothesis, with_forces=True)
@@ -260,7 +269,7 @@ def fits_on_short_recordings(
 
     def whole(fitted: Fitted) -> Fitted:
         there = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
-        # What a period does not show of slow motion under friction would be counted against the law.
+        # Slow motion under friction, which one period does not show, would be counted as error of the law.
         return fit(context.measure, context.tuning, there, of_all, 1) if forced else there
 
     each, found = guard.over(context.map_, FITTING), first_fits(short, begun, known, screened)
@@ -273,15 +282,15 @@ def fits_on_short_recordings(
         )
         promising = _keep_promising((begun, found), begun_whole, screened)
         fits += each(whole, first_fits(coarse, begun_whole, of_all, promising))  # type: ignore[arg-type]
-    # A law that the short recordings leave open may run away on the whole.
+    # A law whose parameters the short recordings do not determine may diverge on all samples.
     return sorted((law for law in fits if np.isfinite(law.cost)), key=lambda law: law.cost)
 
 
 def _keep_promising(
     others: tuple[Fitted, Sequence[Fitted]], begun_whole: Fitted, screened: Sequence[ScreenedHypothesis]
 ) -> list[ScreenedHypothesis]:
-    """The hypotheses that promise a share of the cost of `begun_whole` not far below the best share of others; a share,
-    because others are judged on other samples and in other steps. others: their base, and fits."""
+    """The hypotheses whose predicted gain, as a share of the cost of `begun_whole`, is not far below the best share of
+    others; shares, because the others' costs are of other samples and steps. others: their base, and fits."""
     base, fits = others
     best = max((1 - law.cost / base.cost for law in fits), default=0.0)
     return [law for law in screened if 1 - law.cost / begun_whole.cost >= max(WORTH_FITTING * best, 0.0)]

@@ -28,13 +28,16 @@ Bytes = npt.NDArray[np.uint8]
 SIZE = 16
 """Bytes of a packet."""
 SYNC = bytes((0xA5, 0x5A))
+"""First two bytes of a packet."""
 CHECKED = slice(2, 14)
+"""Bytes of a packet that its checksum covers."""
 POLYNOMIAL, START = 0x1021, 0xFFFF
 """CRC-16-CCITT: generator polynomial and initial value."""
 
 LAYOUT = np.dtype(
     [("sync", "<u2"), ("sequence", "<u2"), ("time_us", "<u4"), ("raw", "<u2", (3,)), ("crc", "<u2")]
 )  # fmt: skip
+"""Fields of a packet, as in the table above."""
 
 
 def crc_of(rows: Bytes) -> npt.NDArray[np.uint16]:

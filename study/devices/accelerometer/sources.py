@@ -21,6 +21,7 @@ NI, LABJACK = "ni:", "labjack:"
 """Before the name of a device, in the place of a serial port."""
 
 SCAN_HZ = 4000.0
+"""Requested rate of scans: twice the least rate of 2 kHz, within what either vendor's devices reach."""
 PAUSE_S = 0.01
 """Between two reads: so much comes at once."""
 
@@ -46,14 +47,15 @@ def is_volts(port: str) -> bool:
 
 
 class ScanCounter:
-    """Numbers scans that come without numbers."""
+    """Numbers scans that come without numbers, and counts those that were lost."""
 
     def __init__(self, rate_hz: float) -> None:
+        """rate_hz: the rate that the device reports, by which scans are timed."""
         self._rate_hz, self._next = rate_hz, 0
         self.counts = Counts()
 
     def samples(self, volts: FloatArray) -> Samples:
-        """volts: (n, 3), one after another; a row of `DUMMY_V` is a lost one."""
+        """The scans as numbered and timed samples. volts: (n, 3), in order; a row with `DUMMY_V` is a lost scan."""
         numbers = self._next + np.arange(len(volts))
         self._next += len(volts)
         came = (volts != DUMMY_V).all(axis=1)
@@ -85,6 +87,7 @@ class NiSource:
         return self._scans.counts
 
     def read(self) -> tuple[Samples, float]:
+        """The scans since the last call, and the host's monotonic time in seconds at which they had arrived."""
         time.sleep(PAUSE_S)
         channels = self._task.read(number_of_samples_per_channel=self._all)
         arrived_s = time.monotonic()
@@ -113,6 +116,7 @@ class LabJackSource:
         return self._scans.counts
 
     def read(self) -> tuple[Samples, float]:
+        """The next scans, and the host's monotonic time in seconds at which they had arrived."""
         volts = self._ljm.eStreamRead(self._handle)[0]  # waits for the next scans
         arrived_s = time.monotonic()
         return self._scans.samples(np.array(volts, dtype=np.float64).reshape(-1, 3)), arrived_s

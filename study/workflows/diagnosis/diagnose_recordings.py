@@ -151,7 +151,7 @@ def _add_clean(plan: DiagnosePlan, found: DiagnosisInput) -> tuple[DiagnosisInpu
     """The recordings, and those of the device in order in the same form; None where the plan has none."""
     if not plan.clean:
         return found, None
-    # Imported here: most diagnoses have no recordings of the device in order.
+    # Imported here: most diagnoses have no recordings of the intact device.
     from study.workflows.diagnosis.clean_recordings import with_clean
 
     both = with_clean(found, plan.sources, plan.clean, plan.seed)
