@@ -91,7 +91,7 @@ def explain_impacts(
         suggested = _suggest_second_effects(context, found, best, catalogue)
         beside = _with_second_effect(view, best, suggested, time_left)
     rivals = [rival.hypothesis for rival in others if rival.hypothesis.claims and np.isfinite(rival.cost)]
-    named = _judge(context, found, best, beside, rivals)
+    named = _judge(context, found, view, (best, beside), rivals)
     # Where the gap may be zero, something else makes the response irregular.
     if named is None or any(open_effects(context, named)) or not _needs_gap(context, view, (*beside, best)[0]):
         return None
@@ -210,13 +210,14 @@ def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
 def _judge(
     context: SearchContext,
     found: Explanation,
-    alone: BandPowerFit,
-    beside: Sequence[BandPowerFit],
+    view: View,
+    fits: tuple[BandPowerFit, Sequence[BandPowerFit]],
     others: Sequence[Hypothesis],
 ) -> Explanation | None:
     """The explanation by play, and by a second effect where there is one; None where the re-tuned model or another
-    single effect is as good, or a rival of play as good as play alone. others: these rivals. beside: fits of play with
-    a second effect, the best first."""
+    single effect is as good, or a rival of play, with the same second effect. fits: of play alone, and of play with a
+    second effect, the best first. others: the rivals of play."""
+    alone, beside = fits
     best = (*beside, alone)[0]
     comparison = comparison_of(context, best)
     played = comparison.score_candidate(alone.deviations, alone.hypothesis)
@@ -235,9 +236,14 @@ def _judge(
         for candidate in (*(found.rounds[0] if found.rounds else ()), *found.steps[1:])
         if candidate.fitted.hypothesis.key[-1] != alone.hypothesis.key[-1]
     ]
-    as_good = any(is_as_good(rival, played) for rival in rivals) or any(is_as_good(each, named) for each in earlier)
-    if as_good or not is_convincing(named, retuned):
+    if not is_convincing(named, retuned) or any(is_as_good(each, named) for each in earlier):
         return None
+    for rival in (each for each in rivals if is_as_good(each, played)):
+        second = without_claim(best.hypothesis, 0)
+        start = evaluate_hypothesis(view, given, combine(rival.fitted.hypothesis, second))
+        with_second = fit_band_power(view, start, FIRST_ROUNDS) if beside else start
+        if is_as_good(comparison.score_candidate(with_second.deviations, with_second.hypothesis), named):
+            return None
     rivals = sorted([*rivals, *earlier], key=lambda rival: rival.score.mean_log_error)
     statistic = Statistic(WORDS, comparison.chance, best.errors)
     rounds = ((played, *rivals), *((both,) if both else ()))
