@@ -27,7 +27,13 @@ from analysis.diagnosis.errors.hypothesis import (
 from analysis.diagnosis.errors.output_error import evaluate_fit, expected_gain, gather_evidence
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.search.band_power_comparison import comparison_of, is_as_good, is_convincing, worst_part
+from analysis.diagnosis.search.band_power_comparison import (
+    BandPowerComparison,
+    comparison_of,
+    is_as_good,
+    is_convincing,
+    worst_part,
+)
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.identifiability import open_effects
 from analysis.diagnosis.search.search_context import STARTING, SearchContext
@@ -86,14 +92,16 @@ def explain_impacts(
     if RIVAL in effects:
         others.append(_fit_claim(view, evidence, Claim(effects[RIVAL], "one", best.hypothesis.claims[0].sites)))
     beside: tuple[BandPowerFit, ...] = ()
-    left = comparison_of(context, best).score_candidate(best.deviations, best.hypothesis)
+    comparison = comparison_of(context, best)
+    left = comparison.score_candidate(best.deviations, best.hypothesis)
     if worst_part(left) > EXPLAINED_BY_CHANCE and time_left():
         suggested = _suggest_second_effects(context, found, best, catalogue)
         beside = _with_second_effect(view, best, suggested, time_left)
+        comparison = comparison_of(context, beside[0]) if beside else comparison
     rivals = [rival.hypothesis for rival in others if rival.hypothesis.claims and np.isfinite(rival.cost)]
-    named = _judge(context, found, view, (best, beside), rivals)
+    named = _judge(comparison, found, view, (best, beside), rivals)
     # Where the gap may be zero, something else makes the response irregular.
-    if named is None or any(open_effects(context, named)) or not _needs_gap(context, view, (*beside, best)[0]):
+    if named is None or any(open_effects(context, named)) or not _needs_gap(comparison, view, (*beside, best)[0]):
         return None
     return named
 
@@ -136,7 +144,7 @@ def _with_second_effect(
     return tuple(fitted for cost, fitted in refined if cost <= (1 - IMPACTS_SHARE) * before)
 
 
-def _needs_gap(context: SearchContext, view: View, best: BandPowerFit) -> bool:
+def _needs_gap(comparison: BandPowerComparison, view: View, best: BandPowerFit) -> bool:
     """Whether two bodies that touch without a gap, refitted, leave far more: the profile of the gap at zero."""
     claim, placed = best.hypothesis.claims[0], best.hypothesis.placed_effects()[0]
     free = claim.effect.parameters
@@ -149,7 +157,6 @@ def _needs_gap(context: SearchContext, view: View, best: BandPowerFit) -> bool:
     without = _refine(view, evaluate_hypothesis(view, best.deviations, hypothesis))
     if not np.isfinite(without.cost):
         return False
-    comparison = comparison_of(context, best)
     each = [comparison.score_candidate(fitted.deviations, fitted.hypothesis) for fitted in (best, without)]
     return is_convincing(*each)
 
@@ -208,18 +215,17 @@ def _by_deviations(view: View, at: BandPowerFit) -> FloatArray:
 
 
 def _judge(
-    context: SearchContext,
+    comparison: BandPowerComparison,
     found: Explanation,
     view: View,
     fits: tuple[BandPowerFit, Sequence[BandPowerFit]],
     others: Sequence[Hypothesis],
 ) -> Explanation | None:
     """The explanation by play, and by a second effect where there is one; None where the re-tuned model or another
-    single effect is as good, or a rival of play, with the same second effect. fits: of play alone, and of play with a
-    second effect, the best first. others: the rivals of play."""
+    single effect is as good, or a rival of play, with the same second effect. comparison: its chance is that of the
+    best fit. fits: of play alone, and of play with a second effect, the best first. others: the rivals of play."""
     alone, beside = fits
     best = (*beside, alone)[0]
-    comparison = comparison_of(context, best)
     played = comparison.score_candidate(alone.deviations, alone.hypothesis)
     both = tuple(comparison.score_candidate(each.deviations, each.hypothesis) for each in beside)
     named = (*both, played)[0]
@@ -239,9 +245,11 @@ def _judge(
     if not is_convincing(named, retuned) or any(is_as_good(each, named) for each in earlier):
         return None
     for rival in (each for each in rivals if is_as_good(each, played)):
+        if not beside:
+            return None
         second = without_claim(best.hypothesis, 0)
         start = evaluate_hypothesis(view, given, combine(rival.fitted.hypothesis, second))
-        with_second = fit_band_power(view, start, FIRST_ROUNDS) if beside else start
+        with_second = fit_band_power(view, start, FIRST_ROUNDS)
         if is_as_good(comparison.score_candidate(with_second.deviations, with_second.hypothesis), named):
             return None
     rivals = sorted([*rivals, *earlier], key=lambda rival: rival.score.mean_log_error)

@@ -272,8 +272,7 @@ def _exchange_and_prune(
 ) -> Explanation:
     """Exchange and backward elimination after forward selection; where they crash, nothing is named."""
     nothing = replace(found, after=found.retuned, steps=())
-    refined = exchange_for_refinement(context, found, catalogue, progress, time_left)
-    exchanged = exchange_effects(context, refined, catalogue, progress, time_left)
+    exchanged = exchange_effects(context, found, catalogue, progress, time_left)
     newest = found.steps[-1].newest if found.steps else ""
     return context.guard.part(newest, "its last look", lambda: prune(context, exchanged, time_left), nothing)
 

@@ -18,6 +18,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.result.assemble_findings import impact_remainder
 from analysis.diagnosis.result.wording import summary_lines
+from analysis.diagnosis.search.band_power_comparison import comparison_of
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import open_effects
 from analysis.diagnosis.search.impacts import _needs_gap, explain_impacts, is_irregular
@@ -153,7 +154,8 @@ def asks_gap(real, gap_m, supposed_m):
     context, *_ = searched(real, (replace(played, values={**played.values, "gap": gap_m}),))
     view = View(BandPower(context.measure), context.tuning, map)
     supposed = hypothesis_of_claim(Claim(PLAY, "one", (AXIS,)), [{**played.values, "gap": supposed_m}])
-    return _needs_gap(context, view, evaluate_hypothesis(view, np.zeros(len(context.tuning.names)), supposed))
+    fitted = evaluate_hypothesis(view, np.zeros(len(context.tuning.names)), supposed)
+    return _needs_gap(comparison_of(context, fitted), view, fitted)
 
 
 def test_two_bodies_that_touch_need_no_gap_and_play_does(diagnosed):
