@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
@@ -40,6 +40,7 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
     try:
         import dask
         from distributed import Client, KilledWorker
+        from distributed.client import ClosedClientError
         from distributed.comm import CommClosedError
     except ImportError as missing:
         raise StudyError(
@@ -64,7 +65,7 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
         try:
             with _executor(client) as executor, _watch(client, executor, address, causes):
                 yield executor
-        except (KilledWorker, CommClosedError, CancelledError) as problem:
+        except (KilledWorker, ClosedClientError, CommClosedError, CancelledError) as problem:
             raise causes[0] if causes else _undone_error(problem) from problem
         except (RuntimeError, TypeError, ValueError) as problem:
             # A future that is lost with its scheduler has no result, and distributed's executor fails on unpacking it;
@@ -82,6 +83,14 @@ def _executor(client: "Client") -> Iterator[Executor]:
     try:
         yield executor
     finally:
+        _cancel(executor)
+
+
+def _cancel(executor: Executor) -> None:
+    """Cancel all its work, which the scheduler need not answer."""
+    from distributed.client import ClosedClientError
+
+    with suppress(ClosedClientError):  # a client that gave its scheduler up: there is no work any more
         executor.shutdown(wait=False)
 
 
@@ -108,7 +117,7 @@ def _await_loss(
             last_seen_s = time.monotonic()
         elif time.monotonic() - last_seen_s > WORKER_TIMEOUT_S and not left.is_set():
             causes.append(_no_workers_error(address) if problem is None else _silent_error(address, problem))
-            executor.shutdown(wait=False)  # which the scheduler need not answer
+            _cancel(executor)
             return
 
 

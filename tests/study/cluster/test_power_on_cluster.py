@@ -1,6 +1,7 @@
 """A dask scheduler with two workers on this computer: the same numbers, also where a worker dies."""
 
-from concurrent.futures import ThreadPoolExecutor
+import time
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 
 import pytest
@@ -86,8 +87,25 @@ def test_an_error_of_the_executor_is_a_lost_scheduler_only_where_one_is_lost():
         raise ValueError("of the work itself")
     with here, pytest.raises(StudyError, match="did not do this"), cluster_workers(here.scheduler_address) as pool:
         here.close()
-        pool.submit(len, ()).exception(timeout=60)
+        wait([pool.submit(len, ())], timeout=60)
         raise ValueError("too many values to unpack")
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("given", ["before", "after"])
+def test_work_of_a_client_that_gave_its_scheduler_up_is_reported(given, monkeypatch):
+    clients = []
+    own = distributed.Client
+    monkeypatch.setattr(
+        distributed, "Client", lambda *args, **settings: clients.append(own(*args, **settings)) or clients[0]
+    )
+    gone = distributed.LocalCluster(n_workers=1, host="127.0.0.1", dashboard_address="127.0.0.1:0")
+    with gone, pytest.raises(StudyError, match="did not do this"), cluster_workers(gone.scheduler_address) as pool:
+        gone.close()
+        begun = [pool.submit(len, ())] if given == "before" else []
+        while clients[0].status != "closed":
+            time.sleep(0.1)
+        (begun or [pool.submit(len, ())])[0].result(timeout=60)
 
 
 def test_no_scheduler_is_reported_and_nothing_is_begun(tmp_path, monkeypatch, capsys):

@@ -120,6 +120,7 @@ def test_a_simulated_participant_takes_a_study_on_a_replayed_device(rigs, file, 
     assert not any("void" in row for row in rows[1:])
 
 
+@pytest.mark.real_time
 def test_doctor_checks_a_replayed_device(file, capsys):
     assert main(["doctor", "--device", f"replay:{file}"]) in (0, 1)
     said = capsys.readouterr()
