@@ -11,6 +11,7 @@ from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.limits import Limits
 
 HAND_STIMULUS_CAP_N = 3.0
+"""Upper limit of the stimulus's cap with a hand on the handle (N); docs/safety.md."""
 HAND_TOTAL_CAP_N = 6.0
 """Upper limits with a hand on the handle; without one, settings may declare higher ones."""
 
@@ -24,6 +25,7 @@ HIGHEST = {
     "release_s": 1.0,
     "keep_s": 600.0,
 }
+"""Upper bounds of settings (N/s, s), for those that come from no protocol too."""
 
 HIGHEST_PLAUSIBLE = {
     "workspace_m": 0.5,
@@ -47,6 +49,7 @@ LONGEST_DROP_S = 1.0
 """Longest time after which the hardware must drop the force when nothing writes any more."""
 
 FADE_SHAPES = ("raised_cosine", "linear")
+"""Shapes of a stimulus's fades that the control tick knows."""
 
 
 def check_settings(settings: DeviceSettings, info: DeviceInfo) -> None:

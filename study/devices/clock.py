@@ -18,7 +18,9 @@ class Clock(Protocol):
         """Seconds from an arbitrary start; never goes back."""
         ...
 
-    def sleep(self, seconds: float) -> None: ...
+    def sleep(self, seconds: float) -> None:
+        """Let this much time pass (s); none for zero or less."""
+        ...
 
     def utc(self) -> str:
         """Date and time, ISO 8601."""
@@ -55,6 +57,7 @@ class VirtualClock:
         return self._now_s
 
     def sleep(self, seconds: float) -> None:
+        """Advance the time at once, then call each listener."""
         if seconds <= 0:
             return
         self._now_s += seconds
@@ -75,4 +78,5 @@ class VirtualClock:
         self._listeners.append(listener)
 
     def forget(self, listener: Callable[[float], None]) -> None:
+        """Call this listener no more. Raises ValueError for an unknown one."""
         self._listeners.remove(listener)

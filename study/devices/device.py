@@ -60,6 +60,7 @@ class Fault(Enum):
 
     @property
     def sentence(self) -> str:
+        """The fault as a sentence, with a capital letter and a full stop."""
         return f"{self.value[0].upper()}{self.value[1:]}."
 
     NONE = "none"
@@ -133,7 +134,9 @@ class Device(Protocol):
     """A device behind its safety layer. Opened by `study.devices.opening.open_device`, closed by `close`."""
 
     @property
-    def info(self) -> DeviceInfo: ...
+    def info(self) -> DeviceInfo:
+        """Properties of the device as opened; they stay the same until it is closed."""
+        ...
 
     @property
     def telemetry(self) -> str:

@@ -19,11 +19,13 @@ from numba.extending import intrinsic
 from study.devices.governor.compiling import part
 
 Addresses = npt.NDArray[np.int64]
+"""Addresses of C functions and objects, as 64-bit integers."""
 
 CLOCK, SLEEP, MONOTONIC, ACQUIRE, RELEASE, LOCK, SYSTEM_SIZE = range(7)
 """Places of `system_calls`. CLOCK and SLEEP are 0 where this system's are not used."""
 
 _intrinsic: Any = intrinsic
+"""numba and llvmlite without types: neither declares them."""
 _cgutils: Any = cgutils
 
 _CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
@@ -46,6 +48,7 @@ def _caller(result: Any) -> Any:
 call_int = _caller(types.int32)
 """call_int(address, arguments): the C function's answer, an int."""
 call_float = _caller(types.float64)
+"""call_float(address, arguments): the C function's answer, a double."""
 
 
 def _room(words: int) -> Any:
@@ -140,9 +143,11 @@ class SharedLock:
         self._release = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(address_of(interpreter.PyThread_release_lock))
 
     def acquire(self, patience_s: float) -> bool:
+        """Take the lock. False where it was not free within patience_s."""
         return bool(self._acquire(self.address, int(patience_s * 1e6), 0) == 1)
 
     def release(self) -> None:
+        """Free the lock, from any thread. Only while it is held."""
         self._release(self.address)
 
     def __enter__(self) -> None:

@@ -30,11 +30,17 @@ CLAIM, WRITE_DATA, RELEASE = 0x708B, 0x40017086, 0x708C
 class Line(Protocol):
     """An open line. Where it is gone, any call raises OSError, as pyserial does."""
 
-    def raise_level(self) -> None: ...
+    def raise_level(self) -> None:
+        """Set the line or the data lines, or send the byte."""
+        ...
 
-    def lower_level(self) -> None: ...
+    def lower_level(self) -> None:
+        """Set the line or the data lines back, or send a zero byte."""
+        ...
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """Close the port."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +70,7 @@ class PulseSettings:
 
     @property
     def words(self) -> str:
+        """Which line, in words, for the log."""
         how = {"serial-byte": f"byte {self.code}", "serial-dtr": "DTR", "serial-rts": "RTS"}
         return f"{how.get(self.kind, f'data lines {self.code}')} of {self.port}"
 

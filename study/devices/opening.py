@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from study.devices.telemetry import TelemetryReader
 
 SIMULATED = "simulated"
+"""Name of the simulated omega.3, as `--device` takes it."""
 
 REAL = tuple(MODELS)
 """Devices that move: they need the vendor's library, and real time."""
@@ -60,7 +61,9 @@ class LinkageSource(Protocol):
     """A device's own knowledge of its linkage."""
 
     @property
-    def info(self) -> DeviceInfo: ...
+    def info(self) -> DeviceInfo:
+        """Name, rate, maximum force and mass of the device."""
+        ...
 
     def at(self, position_m: "FloatArray") -> "LinkageReading | None":
         """The linkage at a position of the handle (3,), wherever the handle is; None out of reach. Raises

@@ -38,7 +38,9 @@ class Rig(Protocol):
     """
 
     @property
-    def info(self) -> DeviceInfo: ...
+    def info(self) -> DeviceInfo:
+        """Properties of the device as opened."""
+        ...
 
     @property
     def drops_force_after_s(self) -> float:

@@ -134,6 +134,7 @@ class SafeDevice:
         return record_commands(self._governor, self._info, self._apart)
 
     def look(self) -> Look:
+        """Waits for the loop's next reading, at most `realtime_drive.PATIENCE_S`."""
         self._drive.check()
         fresh = not self._closing and self._drive.refresh()
         missed_ticks = self._governor.missed if self._held is not None or self._runner.moving else 0
@@ -148,6 +149,8 @@ class SafeDevice:
         self._drive.stop()
 
     def close(self) -> None:
+        """Lets go with a fade where a stimulus is under way. A device that did not confirm its zero force or its
+        closing is told on stderr."""
         if self._closed:
             return
         self._closing = True

@@ -29,6 +29,7 @@ FORMAT = 2.0
 """1: rows whose check was the exclusive or of their bits, which equal changes in two cells leave as it was."""
 PREFIX, SUFFIX = "hapteq-", ".ring"
 ROW_BYTES = 8 * cells.RING_WIDTH
+"""A row of 64-bit floats."""
 LEFT_AFTER_S = 60.0
 """A younger file may belong to a program that is just making it."""
 

@@ -14,6 +14,7 @@ GRAVITY_MPS2 = 9.80665
 """Standard gravity (m/s^2)."""
 
 POSITIONS = ("+x up", "-x up", "+y up", "-y up", "+z up", "-z up")
+"""How the sensor is laid down, in the order of the rows of `UP`."""
 UP = np.kron(np.eye(3), np.array([[1.0], [-1.0]]))
 """(6, 3): the axis that points up in each position."""
 

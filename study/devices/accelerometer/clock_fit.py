@@ -30,6 +30,7 @@ class ClockFit:
         return 1e6 * (self.rate - 1.0)
 
     def host_s(self, device_s: FloatArray) -> FloatArray:
+        """Host times (s) of device times (s), any shape."""
         return self.at_host_s + self.rate * (np.asarray(device_s) - self.at_device_s)
 
 

@@ -26,6 +26,7 @@ class Table:
         return self._rows[self._from : self._end]
 
     def append(self, rows: FloatArray) -> None:
+        """rows: (k, columns). The array is made anew, twice as long, only when it is full."""
         if self._end + len(rows) > len(self._rows):
             kept = self.rows
             roomier = np.zeros((max(1024, 2 * (len(kept) + len(rows))), self._rows.shape[1]))

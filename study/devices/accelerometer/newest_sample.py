@@ -29,6 +29,8 @@ class NewestSample:
         self._barrier = threading.Lock()
 
     def put(self, taken_s: float, acceleration: FloatArray, clipped: bool) -> None:
+        """taken_s: time of arrival by `time.monotonic`; acceleration: (3,), m/s², as sensed; clipped: whether a channel
+        is at its limit."""
         count = self.rows[0, COUNT]
         with self._barrier:
             self.rows[1 + int(count) % ROWS] = taken_s, *acceleration, clipped

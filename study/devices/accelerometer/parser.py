@@ -68,6 +68,7 @@ def _table() -> npt.NDArray[np.uint16]:
 
 
 _TABLE = _table()
+"""(256,): CRC of each value of a byte, for a step of eight bits."""
 
 
 LONGEST_SILENCE_US = 10_000_000

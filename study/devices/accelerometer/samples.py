@@ -45,7 +45,9 @@ class Source(Protocol):
     """Read by one thread."""
 
     @property
-    def counts(self) -> Counts: ...
+    def counts(self) -> Counts:
+        """Packets and lost packets since the source was opened."""
+        ...
 
     def read(self) -> tuple[Samples, float]:
         """What came since, and when, by `time.monotonic`. Waits some milliseconds at the most; none where nothing

@@ -44,6 +44,7 @@ class Accelerometer:
 
     @property
     def counts(self) -> Counts:
+        """Packets and lost packets since the board was opened."""
         return self._source.counts
 
     def zero(self, seconds: float = ZEROING_S) -> None:
@@ -62,6 +63,8 @@ class Accelerometer:
         return self._newest.rows
 
     def latest(self) -> tuple[FloatArray, bool]:
+        """Acceleration now, (3,), m/s², zeroed at rest, NaN without a fresh sample (`FRESH_S`); and whether a channel
+        is at its limit. From any thread."""
         return self._newest.fresh(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:
@@ -82,6 +85,7 @@ class Accelerometer:
         return _health(self._history.counted(now_s - seconds), np.zeros((0, 3)), fit), noise, len(stretch.raw) / seconds
 
     def close(self) -> None:
+        """Stop reading and close the source. Never raises; waits at most 1 s for the reading thread."""
         self._closed.set()
         self._thread.join(1.0)
         with contextlib.suppress(Exception):

@@ -21,7 +21,9 @@ class Port(Protocol):
         """Read at most `size` bytes, with a short timeout: fewer or none if no more came."""
         ...
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """May raise; called once."""
+        ...
 
 
 class SerialSource:

@@ -43,14 +43,20 @@ SEEN_ROWS = 8
 """The newest readings; one that is copied meanwhile stays whole for so many ticks less one."""
 
 CALLS = types.int64[::1]
+"""Addresses of C functions: `study.devices.native.system_calls`, followed by the driver's own."""
 SENSE_SIGNATURE = types.int64(CALLS, VECTOR, ROWS, VECTOR)
+"""Signatures of the compiled halves of a rig, in the order of arguments of `study.devices.rig.CompiledIo`: `sense` and
+`write`."""
 WRITE_SIGNATURE = types.int64(CALLS, VECTOR, VECTOR)
 SENSE, WRITE = types.FunctionType(SENSE_SIGNATURE), types.FunctionType(WRITE_SIGNATURE)
 TICK, PUBLISH, MISS = map(types.FunctionType, (TICK_SIGNATURE, PUBLISH_SIGNATURE, MISS_SIGNATURE))
 _RIG = types.Tuple((CALLS, VECTOR, ROWS))  # type: ignore[no-untyped-call]
+"""Grouped arguments of `_tick`: the rig's calls, cells and samples; the governor's arrays (`CompiledTicks`); flags,
+last reading and the newest readings."""
 _GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR, ROWS, VECTOR))  # type: ignore[no-untyped-call]
 _COURSE = types.Tuple((VECTOR, VECTOR, ROWS))  # type: ignore[no-untyped-call]
 _RUN_DUE = types.int64(SENSE, WRITE, TICK, PUBLISH, _RIG, _GOVERNOR, _COURSE, types.int64)
+"""Signatures of the two entry points."""
 _ATTEND = types.int64(SENSE, WRITE, TICK, PUBLISH, MISS, _RIG, _GOVERNOR, _COURSE)
 
 
@@ -138,7 +144,8 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
     def run_due(  # noqa: PLR0913 - compiled code takes function pointers one by one
         sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any, ticks: int
     ) -> int:
-        """Run at most `ticks` ticks that are due, fewer if all is over before. Returns their number."""
+        """Run at most `ticks` ticks that are due, fewer if all is over before. Returns `GOES_ON`, `OVER`,
+        or the rig's own code."""
         _ = sources
         code = GOES_ON
         for _k in range(ticks):

@@ -18,6 +18,7 @@ def halves_of(rig: Rig) -> CompiledIo | None:
 
 
 TICK_PARTS = Part(govern.tick, TICK), Part(govern.publish, PUBLISH)
+"""The parts of a tick that are the same for every rig: looked up once."""
 MISSED = Part(govern.miss, MISS)
 
 
@@ -39,9 +40,12 @@ class CompiledTicks:
 
     @property
     def attends(self) -> bool:
+        """Whether `attend` may be called: it needs the system's own clock and sleep (`native.system_calls`)."""
         return bool(self._halves.calls[SLEEP] != 0)
 
     def run(self, ticks: int) -> int:
+        """Run at most `ticks` ticks, one after another without waiting. Returns `GOES_ON`, `OVER`, or the rig's error
+        code, > 0."""
         self._flags[SEEN], self._running = 0.0, True
         try:
             return int(run_due(*self._parts, self._rig, self._arrays(), self._loop_state, ticks))
@@ -49,6 +53,8 @@ class CompiledTicks:
             self._running = False
 
     def attend(self) -> int:
+        """Run ticks as they become due, until all is over, one fails, or the loop's thread is wanted. Returns as `run`,
+        or `GAP`. Only where `attends`."""
         self._flags[SEEN], self._running = 0.0, True
         try:
             return int(attend(*self._parts, MISSED, self._rig, self._arrays(), self._loop_state))

@@ -22,6 +22,7 @@ from typing import Any
 from study.session.views.views import DeviceFinding
 
 PRIORITY = 40
+"""Priority of the loop's thread under SCHED_FIFO of Linux, 1 to 99: below interrupt threads (50)."""
 SWITCH_S = 0.0005
 """Longest time for which another Python thread keeps the interpreter once the loop wants it; Python's default is 5
 ms."""
@@ -90,6 +91,7 @@ class _Users:
 
 
 _USERS = _Users()
+"""Of this program: its threads share the settings."""
 
 
 @contextlib.contextmanager

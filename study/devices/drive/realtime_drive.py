@@ -77,6 +77,7 @@ class Glances:
 
     @property
     def wanted(self) -> bool:
+        """Whether a request waits for a reading."""
         return self._request is not None and not self._request.taken.is_set()
 
     def mark_taken(self) -> None:
@@ -185,6 +186,7 @@ class RealtimeDrive:
             self._runner.cut()
 
     def close(self) -> None:
+        """End the loop's thread. Waits for it at most `JOIN_S`: one that hangs in a driver is left behind."""
         self._closing = True
         self._wake()
         self._thread.join(JOIN_S)

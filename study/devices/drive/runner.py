@@ -19,11 +19,14 @@ from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE, CompiledRig
 
 _NOISE = types.uint64[::1]
+"""State of a sensor's random numbers, `CompiledRig.noise`."""
 _SENSE = types.FunctionType(types.void(VECTOR, VECTOR, _NOISE, VECTOR))
+"""Types of the function pointers to the parts of a tick."""
 _TICK = types.FunctionType(TICK_SIGNATURE)
 _PUBLISH = types.FunctionType(PUBLISH_SIGNATURE)
 _ADVANCE = types.FunctionType(types.void(VECTOR, VECTOR, VECTOR))
 _RIG = types.Tuple((VECTOR, VECTOR, _NOISE, VECTOR))  # type: ignore[no-untyped-call]
+"""Grouped arguments of `run_block`."""
 _GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR, ROWS))  # type: ignore[no-untyped-call]
 
 
@@ -42,6 +45,7 @@ class Part(types.WrapperAddressProtocol):
         return int(self._address)
 
     def signature(self) -> Any:
+        """numba's signature of the function. Part of numba's protocol of such pointers."""
         return self._signature
 
 
@@ -51,7 +55,9 @@ def parts(sense: Any, advance: Any) -> tuple[Part, Part, Part]:
 
 
 PUBLISHED = Part(publish, _PUBLISH)
+"""The part that writes a tick into the telemetry ring, the same for every rig."""
 _BLOCK = types.void(_SENSE, _TICK, _ADVANCE, _PUBLISH, _RIG, _GOVERNOR, types.int64)
+"""Signature of `run_block`."""
 
 
 @njit(_BLOCK, cache=True, nogil=True, error_model="numpy")
@@ -151,11 +157,13 @@ class CompiledRunner:
         return self._seen if self.failure is None else None
 
     def prepare(self) -> None:
+        """Tells the rig what will be played (`CompiledRig.prepare`)."""
         state = self._governor.state
         repeats, wait = bool(np.isinf(state[cells.LENGTH])), int(state[cells.LEAD] - state[cells.TICK])
         self._rig.prepare(self._governor.steady, repeats, wait)
 
     def glance(self) -> None:
+        """Reads with random numbers of its own: how often it is called changes no recording."""
         rig, reading = self._rig, np.zeros(READING_SIZE)
         try:
             rig.sense(rig.state, rig.parameters, self._glance_noise, reading)
@@ -164,6 +172,7 @@ class CompiledRunner:
             self._seen = None
 
     def run(self, ticks: int) -> None:
+        """In blocks of `block_ticks`; after each, the reading is kept for `seen`."""
         try:
             for start in range(0, ticks, self._block_ticks):
                 self._run_block(min(self._block_ticks, ticks - start))
@@ -174,6 +183,7 @@ class CompiledRunner:
             self.give_up(error)
 
     def drop(self, fault: Fault) -> None:
+        """One tick is run after it, in which the rig is given zero force."""
         self._governor.abandon(fault)
         self._run_block(1)
 

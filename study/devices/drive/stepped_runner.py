@@ -89,6 +89,7 @@ class SteppedRunner:
 
     @property
     def moving(self) -> bool:
+        """Also between the decision of a force and its being written."""
         return self._governor.moving or bool(self.loop_state[DECIDING])
 
     @property
@@ -119,6 +120,7 @@ class SteppedRunner:
             self._seen = None
 
     def run(self, ticks: int) -> None:
+        """In compiled code where the rig has halves for it, else tick by tick."""
         if self._is_gone:
             self._governor.abandon(Fault.LOST)
             return
@@ -173,10 +175,13 @@ class SteppedRunner:
         self._silence(fault)
 
     def cut(self) -> None:
+        """A thread of its own writes zero, past a call of the driver that hangs."""
         self.loop_state[GONE] = 1.0
         self._silence(Fault.STOPPED)
 
     def disconnect(self) -> None:
+        """Zero force, then the driver's `close`, each by a thread of its own and with a timeout (`ZERO_PATIENCE_S`,
+        `CLOSE_PATIENCE_S`)."""
         if self._ended:
             return
         self.loop_state[GONE] = 1.0

@@ -43,6 +43,7 @@ class VirtualDrive:
         """The next tick hears it; none is under way."""
 
     def close(self) -> None:
+        """Run no more ticks when the clock moves on."""
         if not self._closed:
             self._closed = True
             self._clock.forget(self._pump)

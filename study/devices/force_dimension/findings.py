@@ -20,12 +20,15 @@ CAP_N = 1.0
 """While it is looked at no force is sent; if one were, the library would cut it here."""
 
 AT_REST_S = 0.3
+"""Time (s) for which the handle is left to itself, gravity compensated, before its speed is read."""
 EVERY_S = 0.002
+"""Interval (s) of the zero forces sent meanwhile, shorter than the device's watchdog."""
 DRIFTING_MPS = 0.02
 """After `AT_REST_S` with gravity compensated and no hand: 7 % of g in excess of friction. Below, friction holds it."""
 
 POWER = "Switch its power supply on."
 SENSOR = "Accelerometer"
+"""Title of the findings on the accelerometer."""
 
 
 def examine(name: str) -> tuple[DeviceFinding, ...]:

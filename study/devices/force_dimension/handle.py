@@ -12,6 +12,7 @@ STALE, SCALED = 1, 2
 give that force and gives less of it, in the same direction."""
 
 WATCHDOG_UNIT_S = 125e-6
+"""Unit of dhdSetWatchdog's and dhdGetWatchdog's argument (s)."""
 STATUS_SIZE = 32
 """17 in SDK 3.17.5; room for more, since a library writes as many as it knows."""
 
@@ -33,6 +34,7 @@ OFF_CAUSES = {
     UNPOWERED_CAUSE: "its power supply is off",
     UNCALIBRATED_CAUSE: "it does not know its place any more, and needs to be calibrated",
 }
+"""Words for the library's codes of why the forces are off, and for the two of our own."""
 WATCHDOG_CAUSE = 3
 """The library's code for forces that the device's watchdog switched off."""
 
@@ -58,6 +60,7 @@ class Status:
 
     @property
     def why_off(self) -> str:
+        """`off_cause` in words."""
         return why_off(self.off_cause)
 
 
@@ -72,6 +75,7 @@ class Handle:
         self._open = True
 
     def position_m(self) -> tuple[float, float, float]:
+        """Position of the handle (m), x, y, z, in the device's axes."""
         x, y, z = c_double(), c_double(), c_double()
         self.library.call("dhdGetPosition", byref(x), byref(y), byref(z), self.number)
         return x.value, y.value, z.value
@@ -93,6 +97,7 @@ class Handle:
         return x.value, y.value, z.value
 
     def status(self) -> Status:
+        """State of the device: powered, calibrated, force on, braking, and why the force is off."""
         values = (c_int * STATUS_SIZE)()
         self.library.call("dhdGetStatus", values, self.number)
         return Status(
@@ -104,9 +109,11 @@ class Handle:
         )
 
     def system_type(self) -> int:
+        """The library's number of the device's model."""
         return self.library.call("dhdGetSystemType", self.number)
 
     def system_name(self) -> str:
+        """The library's name of the device's model; "unnamed" where it has none."""
         return (self.library.function("dhdGetSystemName")(self.number) or b"unnamed").decode("utf-8", "replace")
 
     def serial(self) -> int:
@@ -128,11 +135,13 @@ class Handle:
         self.set_force(0.0, 0.0, 0.0)
 
     def compensate_gravity(self, effector_mass_kg: float | None) -> None:
+        """Switch gravity compensation on. effector_mass_kg: mass of the end effector; None leaves the library's own."""
         if effector_mass_kg is not None:
             self.library.call("dhdSetEffectorMass", effector_mass_kg, self.number)
         self.library.call("dhdSetGravityCompensation", 1, self.number)
 
     def limit_force(self, newtons: float) -> None:
+        """Cap of the library itself on the norm of the force (N)."""
         self.library.call("dhdSetMaxForce", newtons, self.number)
 
     def read_every_time(self) -> None:

@@ -22,6 +22,7 @@ HEADER = re.compile(r"\s*\[\[?[\w.\"-]+\]\]?\s*(#.*)?")
 """Header of a table in TOML; a row of numbers in brackets does not match."""
 
 FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
+"""Environment variable that names the lab's file, in place of the default one."""
 
 
 @dataclass(frozen=True, config=STRICT)

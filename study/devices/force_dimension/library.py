@@ -23,6 +23,7 @@ GEOMETRY_ERROR, DEVICE_IN_USE = 8, 20
 
 _ID, _NUMBER, _NUMBERS = c_byte, c_double, POINTER(c_double)
 _THREE = (_NUMBERS, _NUMBERS, _NUMBERS, _ID)
+"""Arguments of functions that give a vector: x, y, z, device."""
 
 SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdErrorGetLast": (c_int, ()),
@@ -90,6 +91,7 @@ class Library:
 
     @property
     def version_text(self) -> str:
+        """Version of the vendor's SDK in words, as "3.17.5"."""
         return _version_words(self.version)
 
     def function(self, name: str) -> Callable[..., Any]:

@@ -37,6 +37,7 @@ POSITION, FORCE, STATUS, BUTTONS, BRAKES, ENABLE, GIVEN, CALLS_SIZE = range(SYST
 LIBRARY = (
     "dhdGetPosition", "dhdSetForce", "dhdGetStatus", "dhdGetButtonMask", "dhdSetBrakes", "dhdEnableForce", "dhdGetForce"
 )  # fmt: skip
+"""Functions of the vendor's library that a tick calls, in the order of their places."""
 
 (
     NUMBER, CAP_N, DROPS_AFTER_S, READS, REPEATED, TOO_STRONG, PRESSED, SENT_S, SENT_ZERO, WITHHELD_UNTIL_S, CLOSED,
@@ -57,10 +58,11 @@ WEIGHT = SENT + 3 * MEMORY
 report in ticks: sent force (x, y, z), its square, its product with the reported one."""
 LAGGED, OF_LAG = WEIGHT + 5, 5
 REPORTED_AT_REST = LAGGED + OF_LAG * MEMORY
+"""First cell of the reported force after a zero (x, y, z; N)."""
 ODD_AT_REST = REPORTED_AT_REST + 3
-"""First cell of the reported force after a zero (x, y, z; N), and the number of zeros in a row after which it was more
-than `ODD_N`."""
+"""Number of zeros in a row after which that force was more than `ODD_N`."""
 CELLS_SIZE = ODD_AT_REST + 1
+"""Number of cells of the driver."""
 
 OF_LIBRARY = 1
 """Error code of a failed call of the first function of LIBRARY; the codes of the others follow."""

@@ -88,6 +88,7 @@ class ForceDimensionRig:
         return CompiledIo(tick_io.sense_once, tick_io.write_once, self._calls, self._cells, self._samples, self._error)
 
     def sense(self) -> FloatArray:
+        """The acceleration stands in it as by the newest sample; NaN without a fresh one."""
         reading = np.empty(READING_SIZE)
         self._raise_for(tick_io.sense_once(self._calls, self._cells, self._samples, reading))
         if self._overlaid is not None:
@@ -100,6 +101,8 @@ class ForceDimensionRig:
         return frozenset(bit for bit in range(32) if mask >> bit & 1)
 
     def write(self, force_n: FloatArray) -> None:
+        """A zero is sent in any case. Raises `study.errors.DeviceError` after a failure, and for a force above the cap,
+        in whose place a zero is sent."""
         self._raise_for(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
@@ -142,6 +145,7 @@ class ForceDimensionRig:
                     self._handle.set_force(0.0, 0.0, 0.0)
 
     def close(self) -> bool:
+        """False where the library did not confirm it. Closes the accelerometer too."""
         self._cells[loop_cells.WITHHELD_UNTIL_S] = 0.0
         self._cells[loop_cells.CLOSED] = 1.0
         self._closed.set()

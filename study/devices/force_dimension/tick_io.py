@@ -69,6 +69,7 @@ A force whose peaks alone are scaled is so only for some milliseconds in a row, 
 ROUNDING = 1 + 1e-9
 """Factor on the cap that rounding may need."""
 REST_SIGNATURE = types.int64(CALLS, VECTOR, types.float64, VECTOR)
+"""Signature of the compiled function that repeats the zero force between stimuli."""
 LOCK_S = 0.002
 """Longest wait for the lock (s). A write lasts a tenth of it: a longer wait is for a call that hangs."""
 

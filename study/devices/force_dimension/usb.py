@@ -11,6 +11,7 @@ VENDOR = "1451"
 """Force Dimension's USB vendor number, hexadecimal."""
 
 RULE_FILE = "/etc/udev/rules.d/51-forcedimension.rules"
+"""Rules of Linux on who may open a device of the vendor on the USB."""
 RULE = f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{VENDOR}", MODE="0660", TAG+="uaccess"'
 """Lets the person who sits at the computer open the device."""
 

@@ -63,6 +63,7 @@ RING_FACTORS = np.array(
 """Odd, and another one for each place: equal changes in several cells, as a hand makes them, do not cancel. Bits enter
 as `bits ^ (bits >> RING_FOLD)`, because the lower bits of a round number are all zero."""
 RING_FOLD = 29
+"""Bits by which a cell's higher bits are shifted onto its lower ones; see `RING_FACTORS`."""
 
 RING_COUNT, RING_RATE_HZ, RING_FORMAT = range(3)
 """Cells of the ring's first row, its header: rows written so far, ticks per second, what the rows are."""

@@ -46,6 +46,7 @@ LEAST_ELAPSED = 1e-3
 
 VECTOR, ROWS = types.float64[::1], types.float64[:, ::1]
 TICK_SIGNATURE = types.boolean(VECTOR, VECTOR, ROWS, ROWS, VECTOR, VECTOR)
+"""Signatures of the entry points `tick`, `publish` and `miss`, whose docstrings name the arguments."""
 PUBLISH_SIGNATURE = types.void(VECTOR, VECTOR, ROWS, VECTOR)
 MISS_SIGNATURE = types.void(VECTOR, ROWS, VECTOR, types.int64)
 
@@ -249,5 +250,6 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
 
 
 _SOURCES = fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
+"""Changes with each file whose code is compiled into the entry points."""
 tick, miss = _entry_points(_SOURCES)
 publish = _publishing(_SOURCES)

@@ -22,6 +22,7 @@ SETTLE_S = 0.5
 """Before a recording's first sample: half for the spring to come in, half for the handle to come to rest."""
 
 FAULTS = tuple(Fault)
+"""Faults by their code in `cells`."""
 
 
 class Governor:
@@ -46,6 +47,7 @@ class Governor:
 
     @property
     def moving(self) -> bool:
+        """Whether a stimulus or a fade of it is under way."""
         return bool(self.state[cells.PHASE] != cells.STILL)
 
     @property
@@ -55,17 +57,21 @@ class Governor:
 
     @property
     def fault(self) -> Fault:
+        """The fault of the present or last stimulus; `Fault.NONE` without one."""
         return FAULTS[int(self.state[cells.FAULT])]
 
     @property
     def ticks(self) -> int:
+        """Ticks run since `begin_hold` or `begin_play`."""
         return int(self.state[cells.TICKS])
 
     @property
     def missed(self) -> int:
+        """Ticks that passed unattended since `begin_hold` or `begin_play`."""
         return int(self.state[cells.MISSED])
 
     def begin_hold(self, stimulus: HeldStimulus) -> None:
+        """Set up a stimulus that is repeated until it is released; the next tick is its first."""
         fade_in, fade_out = self._ticks(stimulus.fade_in_s), self._ticks(stimulus.fade_out_s)
         self._begin(stimulus.played_once_then_loop, self._kept_of_loop(len(stimulus.loop)))
         state, lead = self.state, len(stimulus.onset) if stimulus.onset is not None else 0
@@ -80,6 +86,8 @@ class Governor:
         state[cells.PHASE] = cells.PLAYING
 
     def begin_play(self, commands: Signal) -> None:
+        """Set up commands that are played once, after `SETTLE_S` with the spring alone; the next tick is the first of
+        these."""
         settle = self._ticks(SETTLE_S)
         self._begin(commands.samples, len(commands))
         state = self.state
@@ -96,6 +104,7 @@ class Governor:
         self.state[cells.BEGAN_S] = now_s
 
     def sign_of_life(self) -> None:
+        """Start the watchdog's time anew."""
         self.state[cells.SIGN_OF_LIFE] = 1.0
 
     def ask_release(self) -> None:
@@ -112,6 +121,7 @@ class Governor:
 
     @property
     def stop_asked(self) -> bool:
+        """Whether `ask_stop` was called; it stays True."""
         return bool(self.state[cells.STOP_ASKED] != 0.0)
 
     def abandon(self, fault: Fault) -> None:
@@ -131,6 +141,7 @@ class Governor:
         self.state[cells.LATEST_S] = max(self.state[cells.LATEST_S], after_s)
 
     def health(self) -> Health:
+        """Counters since `begin_hold` or `begin_play`."""
         state = self.state
         return Health(
             fault=self.fault,
@@ -162,6 +173,7 @@ class Governor:
 
     @property
     def began_s(self) -> float:
+        """When the stimulus began, by the loop's clock (s); see `note_begin`."""
         return float(self.state[cells.BEGAN_S])
 
     @property

@@ -58,6 +58,7 @@ class Call:
         return self._last is not None
 
     def hear(self, message: tuple[int, Any]) -> None:
+        """Take a message of the process: progress, or the answer that ends the call. From the line's thread."""
         if message[0] == PROGRESS:
             self._progress.put(message[1])
         else:

@@ -35,6 +35,7 @@ SENT_S_PER_RECORDED_S = 0.05
 """A recorded second is some 100 kB, which a pipe takes in 2 ms; a busy computer is slower."""
 
 NEVER_HELD = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
+"""Health before the first stimulus: no fault, nothing counted."""
 
 
 def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevice":
@@ -91,6 +92,7 @@ class RemoteDevice:
 
     @property
     def info(self) -> DeviceInfo:
+        """As the device told when it was opened."""
         return self._info
 
     @property
@@ -107,10 +109,12 @@ class RemoteDevice:
             raise
 
     def keep_alive(self) -> None:
+        """Raises nothing for a lost process: `fault` says it."""
         with contextlib.suppress(DeviceError):
             self._call_remote(self._process.signs, "keep_alive")
 
     def fault(self) -> Fault:
+        """Where the process is lost: STOPPED after an emergency stop, FORCE_LEFT if it was told before, else LOST."""
         try:
             fault: Fault = self._call_remote(self._process.signs, "fault")
         except DeviceError:
@@ -119,12 +123,15 @@ class RemoteDevice:
         return fault
 
     def health(self) -> Health:
+        """Where the process is lost: the counters that it told last."""
         try:
             return self._note_health(self._call_remote(self._process.signs, "health"))
         except DeviceError:
             return self._health_of_the_lost()
 
     def release(self) -> Played:
+        """Where the process is lost: no recording, and the counters that it told last. May be called again after an
+        interruption."""
         if self._lost or self._closed:
             if self._held is None:
                 self._must_be_there()
@@ -171,6 +178,8 @@ class RemoteDevice:
         """Real devices have none."""
 
     def stop(self) -> None:
+        """The process is killed where it does not answer within `STOP_S`: the device's own watchdog then drops the
+        force."""
         if self._lost or self._ended:
             return
         try:
@@ -183,6 +192,7 @@ class RemoteDevice:
             self._lose(gone)
 
     def close(self) -> None:
+        """Waits at most for the fade and twice `CLOSE_S`; a process that does not end is killed."""
         if self._ended:
             return
         self._closing = True

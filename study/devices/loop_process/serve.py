@@ -80,6 +80,7 @@ class DeviceServer:
         ]
 
     def start(self) -> None:
+        """Start the thread of each pipe."""
         for thread in self._threads:
             thread.start()
 
@@ -138,6 +139,7 @@ class Lifetime:
         """From when the end is due."""
 
     def is_over(self) -> bool:
+        """Whether the process was told to end, or the one that started it is gone."""
         return bool(self._told_to_end) or os.getppid() != self._parent
 
     def watch(self) -> None:

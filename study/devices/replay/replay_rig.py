@@ -28,6 +28,7 @@ REPEATED_S = 0.5
 OVER_S = 0.02
 """Within so long the end of a repeated stretch goes over into its beginning."""
 NOMINAL = MODELS["omega3"]
+"""Model whose maximum force and mass a replayed device is given: a recording tells neither."""
 
 TICK, FIRST, LENGTH, REPEATS, OVER = range(5)
 """Indices in the state: ticks since the first row (negative before), first row of the stretch, its number of rows,

@@ -5,6 +5,7 @@ from study.devices.simulated.inlined import inlined
 from study.devices.simulated.layout import ARM_INERTIA, MOUNT_DIRECTION, MOUNT_MASS, MOUNTS, PLATFORM_MASS
 
 SIZE = 3 + MOUNTS
+"""Rows of the mass matrix: three of the handle, and the mount's modes."""
 
 
 @inlined

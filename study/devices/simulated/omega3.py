@@ -13,6 +13,7 @@ from study.devices.simulated.packing import effective_mass_kg, pack_parameters, 
 from study.devices.simulated.parameters import Omega3Parameters, Vector
 
 NAME = "simulated omega.3"
+"""As it stands in `DeviceInfo` and in recordings."""
 MAX_FORCE_N = 12.0
 """Largest force of an omega.3 by its data sheet (N)."""
 

@@ -8,8 +8,10 @@ number was chosen to give.
 from dataclasses import dataclass, field
 
 Vector = tuple[float, float, float]
+"""x, y, z; of drives and legs: one number per leg."""
 
 GRAVITY_M_S2 = 9.81
+"""Gravity of the simulated device, and the g in which its accelerometer's range is given (m/s²)."""
 
 
 @dataclass(frozen=True, slots=True)

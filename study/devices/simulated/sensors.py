@@ -26,6 +26,7 @@ from study.devices.simulated.linkage import forward_kinematics
 from study.devices.simulated.parameters import GRAVITY_M_S2
 
 _STEP = np.uint64(0x9E3779B97F4A7C15)
+"""Increment of the state in SplitMix64, then the factors of its output function: constants of the cited paper."""
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
