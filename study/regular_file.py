@@ -19,6 +19,7 @@ _KINDS = (
     (stat.S_ISCHR, "it is a device, not a file"),
     (stat.S_ISBLK, "it is a device, not a file"),
 )
+"""Tests of a file's mode, and what is said where one is met."""
 
 
 class RefusedFileError(OSError):

@@ -92,6 +92,7 @@ class CommandTable(TyperGroup):
 
     @property
     def commands(self) -> Any:
+        """Commands by name, each imported when it is looked up."""
         return LoadedWhenCalled()
 
     @commands.setter
@@ -99,9 +100,11 @@ class CommandTable(TyperGroup):
         """Required by Typer's interface; there are no further commands."""
 
     def list_commands(self, ctx: Any) -> list[str]:
+        """Names in the order of `COMMANDS`."""
         return list(self.commands)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands under the titles of their groups, without importing any."""
         for title, rows in COMMANDS.items():
             with formatter.section(title):
                 formatter.write_dl(list(rows.items()))
@@ -111,5 +114,6 @@ class Subcommands(TyperGroup):
     """The list of subcommands in `--help`, with each line whole."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the subcommands under one title, each with its whole short help."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, each.get_short_help_str(limit=200)) for name, each in self.commands.items()])

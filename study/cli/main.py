@@ -39,6 +39,7 @@ INTERRUPTED = StudyError(
     "Run it again.",
     saved="Files that it had written are whole; none is half written.",
 )
+"""Said after Ctrl-C where a command says nothing better."""
 
 
 def _version(wanted: bool) -> None:

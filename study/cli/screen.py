@@ -18,6 +18,7 @@ KINDS: dict[int, type[StudyError]] = {
     ExitCode.DEVICE: DeviceError,
     ExitCode.INTERRUPTED: UserInterruptError,
 }
+"""Error for an exit code that the screen's process ended with; `StudyError` for any other."""
 
 
 def has_screen() -> bool:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 PACKAGES = ("study", "analysis", "equalizer", "protocols")
+"""The four packages of hapteq."""
 
 
 def home() -> Path | None:
@@ -33,6 +34,7 @@ def foreign_packages() -> list[Path]:
 
 
 def main() -> int:
+    """Run the command line of hapteq. Returns its exit code; 1 where foreign packages hide its own."""
     foreign = foreign_packages()
     if foreign:
         names = ", ".join(str(path) for path in foreign)

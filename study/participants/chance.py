@@ -8,6 +8,7 @@ import numpy as np
 from study.participants.observer import PerceivedStimulus
 
 _MEDIAN_RESPONSE_S = math.sqrt(1.2 * 2.5)
+"""Median response time (s): the geometric mean of 1.2 s and 2.5 s."""
 _SPREAD_OF_LOG = math.log(2.5 / 1.2) / (2 * 1.96)
 """Chosen so that 95 % of the response times lie between 1.2 and 2.5 s."""
 

@@ -21,6 +21,7 @@ from study.participants.observer import PerceivedStimulus, Reply
 from study.participants.psychometric_curve import WeibullCurve, threshold_at
 
 _NORMAL = NormalDist()
+"""Standard normal distribution."""
 
 
 @dataclass(frozen=True, slots=True)

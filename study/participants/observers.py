@@ -33,6 +33,7 @@ OBSERVERS = {
 and so are delivered_7_seed_1, repeating_7_seed_1 and criterion_drift_7_seed_1, with the same thresholds."""
 
 _MEMBER = re.compile(rf"(?P<kind>{'|'.join(KINDS)})_(?P<number>[1-9]\d*)_seed_(?P<seed>\d+)")
+"""Name of a person of a simulated population: kind, number from 1, and seed of the population."""
 
 
 def find_observer(name: str, seed: int) -> Observer:

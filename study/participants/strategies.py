@@ -24,6 +24,7 @@ class Alternator:
     name: str
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
+        """By the number of answers before in the session."""
         _, delay = uniform(felt, seed, 2)
         return Reply(1 + felt.trials_before % 2, response_time_s(delay))
 
@@ -51,6 +52,7 @@ class Scripted:
     at its 36th answer in run 0, slightly earlier or later in others."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
+        """The character of the script at run + trial, modulo its length: a void trial gets the same answer again."""
         _, delay = uniform(felt, seed, 2)
         right = self.script[(felt.run + felt.trial) % len(self.script)] == "1"
         return Reply(felt.direction_shown if right else 3 - felt.direction_shown, response_time_s(delay))

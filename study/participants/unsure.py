@@ -15,6 +15,7 @@ from study.participants.direction_feeler import DirectionFeeler
 from study.participants.observer import PerceivedStimulus, Reply
 
 _NORMAL = NormalDist()
+"""Standard normal distribution."""
 
 
 @dataclass(frozen=True, slots=True)

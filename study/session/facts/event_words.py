@@ -35,6 +35,7 @@ from study.session.views.archive_views import TURNED_AWAY
 from study.session.views.local_time import Zone, in_utc, local_parts
 
 _Key = tuple[int, int, int]
+"""Run, trial and attempt of a presentation."""
 
 
 def log_in_words(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...]:
@@ -123,6 +124,7 @@ PROBES = {
     "free": "Test whether the handle is free",
     "reference": "Reference without a hand",
 }
+"""Beginning of the sentence about a probe, by its kind."""
 
 
 def _describe_probe(event: ProbePlayed | ProbeMeasured) -> str:

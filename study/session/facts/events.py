@@ -78,7 +78,9 @@ __all__ = [
 ]
 
 SESSION_FORMAT: Literal["hapteq-session"] = "hapteq-session"
+"""Name of the format, in the opening line of a log."""
 SESSION_VERSION: Literal[1] = 1
+"""Version of the log's format; facts and fields may be added within it."""
 
 FIELDS_SINCE: dict[str, object] = {
     "monotonic_s": None,
@@ -254,8 +256,10 @@ Event = (
     | SessionResumed
     | SessionClosed
 )
+"""Any fact of a session."""
 
 EVENTS: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="event")])
+"""Reads and writes a fact; `event` says which one it is."""
 
 
 def event_line(event: Event) -> bytes:

@@ -15,6 +15,7 @@ SEED = "0" * DIGITS
 
 _FIELD, _END = b',"chain":"', b'"}'
 _LENGTH = len(_FIELD) + DIGITS + len(_END)
+"""Bytes of the checksum's field at the end of a line."""
 _HEXADECIMAL = frozenset(b"0123456789abcdef")
 
 
@@ -28,6 +29,7 @@ class Chain:
     """Number of the first line with a checksum, from 1; 0 if there is none."""
 
     def in_words(self) -> str:
+        """How much of the log has checksums, in words."""
         if not self.since:
             return "without checksums (an older version wrote it)"
         return "with checksums" if self.since == 1 else f"with checksums from line {self.since} on"

@@ -19,6 +19,7 @@ from study.session.facts.fact_types import (
 )
 
 FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
+"""Of every logged fact: no unknown fields, no NaN or infinity."""
 
 
 @dataclass(frozen=True, config=FACT)

@@ -3,7 +3,9 @@
 SCREEN_SILENT = "the screen gave no sign of life"
 """The screen process may have been suspended, hung, or waiting for a processor; the cause is unknown."""
 SCREEN_LATE = f"{SCREEN_SILENT}: the computer was too busy"
+"""The same, where load or the engine's own lateness shows that the computer was too busy."""
 PROGRAM_STALLED = "the program gave no sign of life, so the force was faded out"
+"""The session's process gave no sign of life within `watchdog_s`."""
 TICKS_MISSED = "of the 1 kHz ticks were missed"
 TICKS_LATE = "of the 1 kHz ticks were late or missed"
 TICK_HELD = "late was the latest 1 kHz tick"
@@ -34,6 +36,7 @@ def computer_too_busy(reason: str) -> bool:
 
 
 TOO_BUSY = "the computer is too busy"
+"""Beginning of the reason for ending a sitting whose void trials the computer caused."""
 
 
 def why_too_many(reasons: tuple[str, ...]) -> str:

@@ -50,7 +50,9 @@ class Finish:
 
 
 Preparation = FillIn | CheckDevice | Leave
+"""What can come before the instructions of a sitting."""
 Action = Demonstrate | Present | Probe | Reference | Rest | FillIn | Leave | Finish
+"""What can come next in a session."""
 
 
 def next_preparation(state: SessionState) -> Preparation | None:

@@ -25,6 +25,7 @@ from typing import Literal
 from study.session.facts.events import SessionOpened
 
 LATEST: Literal[2] = 2
+"""Version that new sessions get."""
 
 
 def same_stimulus_again(opened: SessionOpened) -> bool:

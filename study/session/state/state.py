@@ -50,6 +50,7 @@ class SessionState:
 
     @property
     def finished(self) -> bool:
+        """Whether all runs of the schedule are done."""
         return self.run >= len(self.runs)
 
     @property

@@ -14,8 +14,9 @@ WORKING_DAY_S = 8 * 3600.0
 _F1_HZ, _F2_HZ, _Q1 = 10**0.8, 10**3.1, 0.71
 """Band limits: second-order high-pass and low-pass."""
 _F3_HZ = _F4_HZ = 100 / (2 * math.pi)
+"""Corners of the transition from constant acceleration to constant velocity (15.9 Hz)."""
 _Q2 = 0.64
-"""Transition from constant acceleration to constant velocity, gain 1."""
+"""Quality factor of that transition, whose gain is 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +32,7 @@ class Dose:
 
 
 NO_DOSE = Dose(0.0, 0.0, 0.0)
+"""Before the first vibration."""
 
 
 def hand_arm_weight(frequency_hz: float) -> float:

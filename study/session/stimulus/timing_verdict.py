@@ -31,6 +31,7 @@ ALL_BUSY = 1.0
 """Load average per processor from which all cores are busy."""
 
 ADVICE = "Close other programs, switch power saving off, and measure again."
+"""Shown where the timing is too late."""
 
 
 @dataclass(frozen=True, slots=True)

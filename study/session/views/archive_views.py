@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 Standing = Literal["finished", "unfinished", "running", "refused", "excluded", "withdrawn", "unreadable"]
+"""How far a past session is. `running`: a program has its folder open; `refused`, `excluded`: the participant did not
+take part; `withdrawn`: only a tombstone is left."""
 
 TURNED_AWAY = {
     "refused": "consent was not given",

@@ -13,6 +13,7 @@ Zone = Callable[[datetime], datetime]
 """Converts a moment with any UTC offset to the clock of a place, summer time included."""
 
 Detail = Literal["minutes", "seconds"]
+"""Last part of a time that is shown."""
 
 
 def in_utc(time: datetime) -> datetime:

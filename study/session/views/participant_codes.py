@@ -3,9 +3,12 @@
 import re
 
 ALLOWED = "a code has 1 to 16 letters and digits, at least one digit, such as P01"
+"""The rule in words, part of a sentence."""
 
 _CODE = re.compile(r"(?=.*\d)[A-Za-z0-9]{1,16}")
+"""The rule."""
 _NUMBERED = re.compile(r"(?P<letters>[A-Za-z]*)(?P<digits>\d{1,9})")
+"""Codes that can be counted on: letters, then a number."""
 
 
 def is_code(text: str) -> bool:

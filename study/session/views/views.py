@@ -122,6 +122,7 @@ class DemoDone:
 
 
 DemoChoice = PlayDemo | DemoDone
+"""What a participant can choose in the demonstration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,10 +139,12 @@ class DeviceFinding:
 
     @property
     def wrong(self) -> bool:
+        """Whether it hinders the study: not fine, and no mere warning."""
         return not self.fine and not self.warning
 
     @property
     def verdict(self) -> str:
+        """ok, warn (a warning) or look (wrong), for a column."""
         return "ok" if self.fine else "warn" if self.warning else "look"
 
 
@@ -155,6 +158,7 @@ class DeviceReport:
 
     @property
     def fine(self) -> bool:
+        """Whether all findings are fine; False with a mere warning too."""
         return all(finding.fine for finding in self.findings)
 
     @property
@@ -255,6 +259,7 @@ class Unanswered:
 
 
 Reply = Answered | Unanswered
+"""Reply of a participant to a trial."""
 
 
 def picture_of(directions: TestDirections, swapped: bool) -> DirectionPicture:

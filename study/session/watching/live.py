@@ -7,6 +7,7 @@ Activity = Literal[
     "preparing", "form", "instructions", "demo", "waiting for the handle", "trial", "rest", "pause", "idle",
     "probe", "reference",
 ]  # fmt: skip
+"""What the session does now. `idle`: between two trials; `probe`, `reference`: measurements between trials."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,6 +132,7 @@ _WORDS = {
     "probe": "a probe between two trials",
     "reference": "the reference, hands off the handle",
 }
+"""Each `Activity` in words."""
 
 
 def _activity(watched: FollowedSession, live: Live | None, standing: Standing) -> tuple[str, str]:

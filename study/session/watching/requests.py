@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Who = Literal["participant", "experimenter", "program"]
+"""Who asks; `program`: a finding of the session itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,3 +32,4 @@ class NoteAsked:
 
 
 Request = StopAsked | PauseAsked | NoteAsked
+"""Any request to a running session."""

@@ -43,6 +43,7 @@ class Situation:
 
     @property
     def trials(self) -> tuple[Trial, ...]:
+        """Closed trials of the session so far."""
         return self.watched.state.trials
 
     @property
@@ -63,6 +64,7 @@ class Situation:
         return elapsed_s(begun, Moment(self.now_utc))
 
     def seconds_since(self, utc: str) -> float:
+        """Seconds from this UTC time (ISO 8601) to now; negative for a later one."""
         return seconds_between(utc, self.now_utc)
 
 
@@ -213,8 +215,11 @@ def _answer_alarm(now: Situation) -> Alarm | None:
 
 
 _ENDS = ("gone", "ended")
+"""Alarms about the end of a session: shown for `JUST_NOW_S`, and for good only to a viewer who was there."""
 _OVER: tuple[Callable[[Situation], Alarm | None], ...] = (_log_alarm, _gone_alarm, _end_alarm)
+"""Checks of a session that does not run, most urgent first."""
 _RUNNING: tuple[Callable[[Situation], Alarm | None], ...] = (
     _device_alarm, _silence_alarm, _log_alarm, _adverse_alarm, _handle_alarm, _sensor_alarm, _dose_alarm,
     _time_alarm, _still_alarm, _lapse_alarm, _drift_alarm, _load_alarm, _void_alarm, _answer_alarm,
 )  # fmt: skip
+"""Checks of a running session, most urgent first."""

@@ -13,8 +13,10 @@ Standing = Literal["running", "paused", "resting", "not running", "finished", "s
 """`stopped`: the sitting was ended; `not running`: the program ended without writing so. Both can be resumed."""
 
 ON: tuple[Standing, ...] = ("running", "paused", "resting")
+"""Standings of a session whose program runs."""
 
 RunStatus = Literal["done", "present", "to come"]
+"""State of a run within the schedule."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,10 +95,12 @@ class Exposure:
 
     @property
     def time_share(self) -> float:
+        """Elapsed time over its limit; above 1 beyond it."""
         return self.elapsed_min / self.limit_min
 
     @property
     def dose_share(self) -> float:
+        """A(8) over its limit; above 1 beyond it."""
         return self.dose_a8_mps2 / self.dose_limit_mps2
 
 
@@ -208,4 +212,5 @@ class WatchView:
 
     @property
     def present_run(self) -> WatchedRun | None:
+        """The run that is under way, or would be next; None after the last."""
         return next((run for run in self.runs if run.status == "present"), None)
