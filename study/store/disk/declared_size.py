@@ -5,8 +5,11 @@ disk, and never more than MOST_BYTES: an hour of nine channels at 10 kHz is 2.6 
 """
 
 PLAIN_BYTES = 2**27
+"""Declared bytes that any file may have."""
 FACTOR = 100
+"""Declared bytes per byte on disk: more than that is no compressed data."""
 MOST_BYTES = 2**32
+"""Declared bytes that no file may have more of."""
 
 
 class DeclaredSizeError(ValueError):

@@ -13,6 +13,7 @@ from study.errors import StudyError
 from study.regular_file import RefusedFileError
 
 CHECKED = "Correct it, or make it again; `hapteq validate` checks it."
+"""What to do about a file whose content is wrong."""
 
 
 DAMAGED = (
@@ -82,6 +83,7 @@ class AlreadyThereError(StudyError):
 
 
 _PROSE = {"it", "its", "this", "the", "there", "line", "segment", "segments", "effect", "unknown", "column", "and"}
+"""First words of a problem that begin a sentence; any other first word is a key or a name."""
 
 
 def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from study.store.disk.declared_size import PLAIN_BYTES, DeclaredSizeError, SizeL
 MOST_OBJECTS = 100_000
 """Most groups and data sets of a file: bounds the time and the memory of a visit."""
 _COMPRESSIONS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_LZF)
+"""Filters whose output may be larger than what is on the disk."""
 _OBJECT_BYTES = 1024
 """Upper estimate of a Python object for a variable-length text, a reference or a table row."""
 _DEFLATE_FACTOR = 1032

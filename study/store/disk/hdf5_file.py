@@ -24,6 +24,7 @@ from study.store.disk.hdf5_contents import check_contents
 Value = TypeVar("Value")
 
 SEAL = b"hapteq sha256 "
+"""First bytes of a sealed file; digest and size follow as text."""
 SEAL_BYTES = 512
 """The smallest block that HDF5 leaves to its user."""
 SIGNATURE = b"\x89HDF\r\n\x1a\n"

@@ -15,6 +15,7 @@ from study.regular_file import open_regular
 from study.store.disk.file_errors import CannotReadError
 
 PACKAGES = ("hapteq", "numpy", "scipy", "numba", "h5py", "pandas", "statsmodels")
+"""Packages whose versions a result states, beside that of Python."""
 
 
 @dataclass(frozen=True, slots=True)

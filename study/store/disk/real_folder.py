@@ -28,6 +28,7 @@ class RealFolder:
     """None on systems without paths relative to a descriptor (Windows)."""
 
     def names(self) -> list[str]:
+        """Names in the folder, in order of the alphabet. Raises OSError."""
         return sorted(os.listdir(self.path if self.descriptor is None else self.descriptor))  # noqa: PTH208
 
     def erase(self, name: str) -> None:

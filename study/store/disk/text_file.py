@@ -27,6 +27,7 @@ TOML_BYTES = 2**22
 DEEPEST_KEY = 32
 """Most parts of a dotted key."""
 _PART = r"(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"?|'[^'\n]*+'?)"
+"""A part of a dotted key: bare, or in quotes, closed or not."""
 _PIECE = re.compile(
     r"#[^\n]*+"
     r'|"""(?:[^\\"]|\\.|"(?!""))*+(?:""")?'

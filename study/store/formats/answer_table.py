@@ -31,6 +31,7 @@ class AnswerColumn:
 
     @property
     def name(self) -> str:
+        """Name of the column: table and key of the question, as in `debrief_effort`."""
         return f"{self.table}_{self.question.key}"
 
     @property
@@ -59,9 +60,11 @@ class AnswerTable:
 
     @property
     def header(self) -> tuple[str, ...]:
+        """Names of the columns: subject, session, and the questions."""
         return ("subject", "session", *(column.name for column in self.columns))
 
     def as_csv(self) -> str:
+        """The table as CSV text, header included."""
         lines = [self.header, *((subject, session, *answers) for subject, session, answers in self.rows)]
         return "".join(csv_line(line) + "\n" for line in lines)
 

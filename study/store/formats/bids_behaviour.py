@@ -18,6 +18,7 @@ from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 VERSION = "1.10.0"
+"""Version of the BIDS standard that the dataset states."""
 FIXED = ("subject", "session")
 """Columns that are part of the file name instead."""
 
@@ -32,9 +33,11 @@ TASK = (
     "Each trial plays a sinusoidal force at the hand, in one of two orthogonal directions; the participant answers "
     "which."
 )
+"""`TaskDescription` of the tables' JSON."""
 FACTS_NAME = "facts.json"
 """File name as in the tidy form, here below `code`."""
 QUESTION = "In which of the two directions did the force act? Answer 1 or 2."
+"""`Instructions` of the tables' JSON."""
 README = """# {name}
 
 {title}
@@ -44,6 +47,7 @@ Trials of a study of force directions, exported by hapteq: per participant and s
 `code/protocol.toml` is the protocol with every number of the study, in the form that `hapteq study --protocol` takes;
 `code/{facts_name}` has its hash, the seed of each session, the devices and the versions of the programs.
 """
+"""Text of the dataset's README; the names are filled in."""
 
 
 def write_bids(

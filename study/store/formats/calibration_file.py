@@ -16,6 +16,7 @@ from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-calibration", 1
 KIND = "calibration of a linkage"
+"""What messages call such a file."""
 
 ABOUT = (
     "What a device says of its linkage over a grid of positions (`hapteq calibrate`); arrays have checksums. The file "
@@ -23,6 +24,7 @@ ABOUT = (
     "follows. By them a damaged file is refused before the HDF5 library sees it, which may hang on such a file. Files "
     "of other programs may be without."
 )
+"""Introduction in docs/formats.md."""
 
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
@@ -41,9 +43,12 @@ LAYOUT = (
     Entry("difference", "attribute, number", "largest relative difference of J from finite differences"),
     Entry("provenance", "attribute, JSON text", "versions, command", False),
 )
+"""Contents of the file: checked by tests, and listed in docs/formats.md."""
 
 ARRAYS = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n", "filled")
+"""Datasets of the file, in the order in which they are written."""
 DIMENSIONS = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3)", "filled": "(positions)"}
+"""Shapes in words, for messages; all other arrays are (positions, 3)."""
 
 
 def read_calibration(path: Path) -> LinkageCalibration:

@@ -24,6 +24,7 @@ from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-model", 1
 KIND = "identified model"
+"""What messages call such a file."""
 
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
@@ -51,6 +52,7 @@ LAYOUT = (
     Entry("quality_remarks", "attribute, list of text", "what the errors come from", False),
     Entry("provenance", "attribute, JSON text", "versions, command, seeds, parents", False),
 )
+"""Contents of the file, as docs/formats.md lists them."""
 
 
 def read_identified_model(path: Path) -> IdentifiedModel:
@@ -93,6 +95,7 @@ def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: boo
 
 
 QUALITY = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")
+"""Figures of a model's quality, each an attribute of the file."""
 
 
 def _write_quality(file: Any, quality: ModelQuality) -> None:

@@ -9,6 +9,7 @@ from study.store.disk.layout import Entry
 from study.store.disk.text_file import read_toml_text, write_text
 
 KIND = "mechanical model"
+"""What messages call such a file."""
 
 LAYOUT = (
     Entry("model.name", "text", "what it is a model of"),
@@ -37,6 +38,7 @@ LAYOUT = (
     Entry("tolerance.modes", "number", "relative, of modal frequencies and masses", False),
     Entry("provenance.…", "anything", "versions, command, seeds, parents", False),
 )
+"""Keys of the file, as docs/formats.md lists them."""
 
 
 def read_mechanical_model(path: Path) -> MechanicalModel:

@@ -16,6 +16,7 @@ from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_toml_text
 
 KIND = "table of texts"
+"""What messages call such a file."""
 
 
 def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[str, str]]:

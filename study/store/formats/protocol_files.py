@@ -38,6 +38,7 @@ class ProtocolFile(Generic[P]):
 
     @property
     def locked(self) -> bool:
+        """Whether a lock lies beside the protocol."""
         return self.lock is not None
 
 

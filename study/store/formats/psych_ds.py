@@ -21,10 +21,13 @@ from study.store.formats.trial_columns import TRIAL_COLUMNS
 from study.store.formats.trials_file import trial_problems
 
 DESCRIPTION_NAME = "dataset_description.json"
+"""The dataset's description, whose name the standard sets."""
 PROTOCOL_NAME = "materials/protocol.toml"
+"""The protocol within the dataset."""
 ANSWERS_NAME = "data/description-answers_data.csv"
 """Only where the protocol asks questions."""
 KIND = "Psych-DS dataset"
+"""What messages call such a folder."""
 OURS = "hapteq"
 """Key of the description with what only this program needs: protocol, seeds, devices."""
 
@@ -34,6 +37,7 @@ Trials of a study of force directions, exported by hapteq: one table per session
 presentation. `dataset_description.json` says what each column means and its unit. A row is identified by the columns
 session, run, trial and attempt. `materials/protocol.toml` is the protocol; `hapteq analyze` takes this folder.
 """
+"""Text of the dataset's README; the names are filled in."""
 
 
 @dataclass(frozen=True, slots=True)

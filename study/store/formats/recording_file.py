@@ -30,6 +30,7 @@ _SEGMENT_TYPE = np.dtype(
         ("amplitude", "<f8"), ("period", "<i8"), ("role", h5py.string_dtype()),
     ]
 )  # fmt: skip
+"""A row of the dataset `segments`; its fields as in `SEGMENT_FIELDS`."""
 
 _PACK_ABOVE_BYTES = 2**18
 """Arrays above this size are compressed; smaller ones are too small to gain by it."""

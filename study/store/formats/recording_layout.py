@@ -6,6 +6,7 @@ from study.store.disk.layout import Entry
 
 FORMAT, VERSION = "hapteq-recording", 1
 KIND = "recording"
+"""What messages call such a file."""
 
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
@@ -28,6 +29,7 @@ LAYOUT = (
         False,
     ),
 )
+"""Contents of the file, as docs/formats.md lists them."""
 SIGNAL_ATTRIBUTES = (
     Entry("quantity", "attribute, text or list", "one for all channels, or one per channel"),
     Entry("unit", "attribute, text or list", f"likewise; converted to SI on reading; `{UNSTATED}` where none is known"),
@@ -35,6 +37,7 @@ SIGNAL_ATTRIBUTES = (
         "channels", "attribute, text or list", "one name per column; one text lists them (`fx, fy, fz`), or is numbered"
     ),
 )
+"""Attributes of each dataset of samples."""
 SEGMENT_FIELDS = (
     Entry("start", "whole number", "first sample"),
     Entry("stop", "whole number", "the sample after the last"),
@@ -43,3 +46,4 @@ SEGMENT_FIELDS = (
     Entry("period", "whole number", "samples per period, 0 = not periodic"),
     Entry("role", "text", "`fit`, `test`, or empty"),
 )
+"""Fields of a row of `segments`."""

@@ -14,7 +14,9 @@ from study.store.disk.provenance import Provenance
 
 FORMAT, VERSION = "hapteq-repeats", 1
 SUFFIX = ".repeats.json"
+"""In place of the suffix of the table of forces."""
 KIND = "document of repeats"
+"""What messages call such a file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,7 @@ class Repeats:
 
 
 REPEATS: TypeAdapter[Repeats] = TypeAdapter(Repeats)
+"""Checks the document."""
 
 
 def repeats_path(forces: Path) -> Path:

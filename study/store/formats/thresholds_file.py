@@ -13,7 +13,9 @@ THRESHOLDS_NAME = "thresholds.csv"
 DETECTION_NAME = "detection.csv"
 """Table of detection thresholds; written only where there are detection runs."""
 THRESHOLDS_HEADER = columns(Threshold)
+"""Names of the columns, in their order."""
 KIND = "table of thresholds"
+"""What messages call such a file."""
 
 
 def write_thresholds(path: Path, thresholds: Iterable[Threshold], *, overwrite: bool = True) -> None:

@@ -18,6 +18,7 @@ TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME = "trials.csv", "diction
 ANSWERS_NAME = "answers.csv"
 """Only where the protocol asks questions."""
 KIND = "table of exported trials"
+"""What messages call such a file."""
 
 
 def is_tidy_csv(folder: Path) -> bool:

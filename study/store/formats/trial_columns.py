@@ -33,3 +33,4 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "garbled_bytes": ("Bytes from the accelerometer that belonged to no whole packet", ""),
     "acceleration_missing": ("Share of the packets, or of the recorded ticks, without an acceleration", ""),
 }
+"""Meaning and unit of each column, empty where it has none; the keys are the fields of `Trial`."""

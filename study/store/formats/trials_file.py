@@ -11,7 +11,9 @@ from study.store.disk.text_file import read_text, write_text
 
 TRIALS_NAME = "trials.csv"
 TRIALS_HEADER = columns(Trial)
+"""Names of the columns, in their order."""
 KIND = "table of trials"
+"""What messages call such a file."""
 
 
 def write_trials(path: Path, trials: Iterable[Trial]) -> None:

@@ -12,7 +12,9 @@ from study.store.disk.privacy import PRIVATE_FOLDER, close_data_folder, make_fol
 from study.store.sessions.event_log import LOG_NAME
 
 FOLDER = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
+"""Name of a session's folder: participant code and number."""
 TOMBSTONE_NAME = "withdrawn.json"
+"""File that stays in the folder of a withdrawn participant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,22 +25,27 @@ class SessionFolder:
 
     @property
     def name(self) -> str:
+        """Name of the session, as in P01_001."""
         return self.path.name
 
     @property
     def subject(self) -> str:
+        """Participant code."""
         return self.name.rpartition("_")[0]
 
     @property
     def log(self) -> Path:
+        """Path of the event log."""
         return self.path / LOG_NAME
 
     @property
     def recordings(self) -> Path:
+        """Folder of the session's recordings."""
         return self.path / "recordings"
 
     @property
     def tombstone(self) -> Path:
+        """Path of the tombstone, whether it is there or not."""
         return self.path / TOMBSTONE_NAME
 
     @property
@@ -48,6 +55,7 @@ class SessionFolder:
 
     @property
     def withdrawn(self) -> bool:
+        """Whether the session was withdrawn, or its withdrawal was begun."""
         return self.tombstone.exists() or self.withdrawal.exists()
 
 

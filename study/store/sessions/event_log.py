@@ -16,6 +16,7 @@ from study.store.disk.privacy import PRIVATE_FILE
 
 LOG_NAME = "events.jsonl"
 NO_LINES = Chain()
+"""The hash chain before the first line."""
 
 
 class EventLog:
@@ -70,6 +71,7 @@ class EventLog:
         self._chain = after
 
     def close(self) -> None:
+        """Close the file; its lines are on the disk already. Called once."""
         os.close(self._descriptor)
 
 

@@ -18,6 +18,7 @@ LIVE_FORMAT = "hapteq-live"
 LIVE_VERSION = 1
 
 _ACTIVITIES = get_args(Activity)
+"""All activities that a reader accepts."""
 _LARGEST_BYTES = 1 << 16
 """Largest file that is read; ours have about a kilobyte."""
 

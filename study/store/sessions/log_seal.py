@@ -22,8 +22,10 @@ from study.store.disk.json_document import read_json, write_json
 from study.store.sessions.event_log import LOG_NAME, LogContents, read_log
 
 SEAL_NAME = "seal.json"
+"""File of the first seal; later ones are seal-2.json, seal-3.json and so on."""
 SEAL_FORMAT, SEAL_VERSION = "hapteq-seal", 1
 _NAME = re.compile(r"seal(-(?P<number>\d{1,6}))?\.json", re.ASCII)
+"""Name of any seal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,7 @@ class Seal:
 
 
 SEAL: TypeAdapter[Seal] = TypeAdapter(Seal)
+"""Checks and writes a seal."""
 
 
 def seal_paths(folder: Path) -> dict[int, Path]:

@@ -22,18 +22,24 @@ from study.store.disk.real_folder import is_real_folder
 from study.store.disk.strict_json import load_json
 
 REQUESTS_NAME = "requests"
+"""Folder of the requests, in that of the session."""
 REQUEST_FORMAT = "hapteq-request"
 REQUEST_VERSION = 1
 
 KINDS: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
+"""Kinds of requests, by the beginning of the file's name."""
 _STOP = "stop"
+"""Beginning of the name of a request to stop: it counts even if its content cannot be read."""
 _NOTE = "note-"
+"""Beginning of the name of a note: it is kept from one sitting to the next."""
 _WHO = get_args(Who)
+"""Senders that a reader accepts."""
 _LARGEST = 1 << 16
 """Bytes of a request that are read; a note is a sentence or two."""
 _AT_ONCE = 50
 """Requests taken in one look: a flood must not block the session's loop."""
 _counter = itertools.count()
+"""Keeps the names of this program's requests apart, and in order, within a tick of the clock."""
 
 
 class RequestInbox:

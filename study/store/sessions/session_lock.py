@@ -10,7 +10,9 @@ from study.errors import StudyError
 from study.store.disk.privacy import PRIVATE_FILE
 
 LOCK_NAME = "session.lock"
+"""Lock file in the session's folder."""
 PLACES_NAME = ".places.lock"
+"""Lock file in the data folder, held while a participant number is taken."""
 PATIENCE_S = 20.0
 """Taking a place reads the first lines of all sessions in the folder."""
 

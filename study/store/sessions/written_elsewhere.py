@@ -11,6 +11,7 @@ from study.store.disk.real_folder import is_real_file
 from study.store.sessions.archive import FOLDER
 
 WRITTEN_ELSEWHERE = "written_elsewhere.txt"
+"""File in the data folder with one path a line."""
 
 
 def note_written(source: Path, out: Path, always: bool = False) -> None:
