@@ -35,6 +35,7 @@ class ImportNotes:
         self._parts: dict[str, list[str]] = {}
 
     def add(self, part: str, sentence: str) -> None:
+        """Add a sentence about a part, by the part's label; the same one only once."""
         parts = self._parts.setdefault(sentence, [])
         if part not in parts:  # channels of the same name, with several roles
             parts.append(part)

@@ -32,7 +32,9 @@ _TIME = re.compile(
     r"(_?(s|ms|us))?",
     re.IGNORECASE,
 )
+"""Name of a time column, with or without a unit."""
 _NUMBER = re.compile(r"\d+")
+"""A number in a prefix: prefixes that differ by it alone are runs of one measurement."""
 _NAMED = 3
 """Most names that an error lists."""
 

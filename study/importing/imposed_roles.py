@@ -13,12 +13,15 @@ IMPOSED = (
     "force does not. If the force was commanded, import by a map with the roles the other way round: role = "
     '"command" for the force, role = "response" for the motion'
 )
+"""Said where the test finds that the motion was imposed."""
 NOT_IMPOSED = (
     "The force is taken for the command. If the motion was imposed and the force was measured, as on a testing "
     'machine, import by a map with the roles the other way round: role = "command" for the motion, role = "response" '
     "for the force"
 )
+"""Said where it finds none."""
 _TURNED: dict[str, SignalRole] = {"command": "response", "response": "command", "position": "command"}
+"""Role of a signal where the motion was imposed, by its role where the force is the command."""
 
 Role = SignalRole | Literal[""]
 

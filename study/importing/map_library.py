@@ -26,6 +26,7 @@ from study.store.formats.recording_layout import FORMAT
 NO_DATA = (".toml", ".md")
 """File types beside data that are not data."""
 _NUMBER = re.compile(r"\d+")
+"""A number in a file's name: files that differ by it alone are parts of one recording."""
 _SHOWN = 4
 """Files that a message names."""
 

@@ -24,11 +24,13 @@ from study.importing.surplus_arrays import (
 )
 
 _FORCES = ("force", "torque")
+"""Quantities that are forces; of rotation, torques."""
 _NAMED = 4
 """Most further runs that a comment of the skeleton names; dots stand for more."""
 _SHARE = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
 """Parts of a name that state the role of the data, as in `u_test`."""
 _TIME_UNITS = ("s", "ms", "us", "min")
+"""Units of time stamps, by the last part of a name."""
 
 
 def map_skeleton(arrays: Arrays) -> str:

@@ -18,6 +18,7 @@ _OF_COMMANDS = (
     'A command that moves in straight lines between its samples has resample = "linear" and, at the top of the map, '
     'hold = "linear"; one that stays until the next has "held" and hold = "zero-order"'
 )
+"""Advice on the resampling of commands, beside their `hold`."""
 
 Key = tuple[str, str]
 """Role and name of a channel."""

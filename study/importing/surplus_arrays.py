@@ -16,16 +16,20 @@ CLOCK_WORDS = {
     "t", "time", "timestamp", "timestamps", "datetime", "zeit", "zeitstempel", "temps", "tiempo", "tempo",
     "tout", "date",
 }  # fmt: skip
+"""Words of a time column's name, in lower case."""
 _INDEX = re.compile(
     r"column1|#|unnamed: 0|(index|idx|i|n|nr|no|number|row|record|sample|scan|point)[ _.]?(nr|no|number|#)?\.?",
     re.IGNORECASE,
 )
+"""Name of a column that numbers the rows, or of one without a name."""
 _RATE = re.compile(
     r"((.* )?(fs|(sampl(e|es|ing)|scan|acquisition|logging) ?(rate|freq|frequency)|sampling)|rate)(( in)? ?k?hz)?"
 )
 """Words of the name of a sample rate; not of an excitation rate."""
 _STEP_WORDS = {"ts", "dt"}
+"""Names of a sampling interval (s)."""
 _USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
+"""Ratios of the units of two clocks that are tried where a name states no unit."""
 _EVEN = 0.02
 """Largest range of a clock's steps, relative to their median, for them to count as even."""
 SAME_CLOCK = 0.5

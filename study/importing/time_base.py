@@ -26,9 +26,11 @@ _BINARY = 1e-3
 _USUAL_GAP = 3
 """Steps, in median steps, from which stamps have a gap."""
 _HOUR_S = 3600.0
+"""Step of a clock that is set to summer time or back (s)."""
 _COUNTERS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
 """Values at which the clocks of loggers wrap around, in units of the file."""
 _PLAIN_DIGITS = (4, 5, 6)
+"""Significant digits to which a rate is rounded before it is tried as the exact one."""
 NUMBERED_HZ = 1.0
 """Nominal rate of samples without known time."""
 MOST_SAMPLES = 10**8
@@ -52,6 +54,7 @@ class TimeBase:
 
     @property
     def fastest_hz(self) -> float:
+        """The stated rate, else that of the median step of the stamps (Hz)."""
         return self.rate_hz or 1 / float(np.median(np.diff(self.times_s(0))))
 
     def times_s(self, count: int) -> Value:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy.typing as npt
 
 _SEPARATORS = ("__", "/", ".", "_", " ")
+"""Marks between the prefix of a run and the name of an array; on a tie the first one wins."""
 _LOOSE = ("_", " ", ".")
 """Common separators in names; a prefix before one of them must contain a digit."""
 

@@ -20,12 +20,16 @@ from study.store.disk.file_errors import DAMAGED, CannotReadError, UnusableFileE
 from study.store.disk.hdf5_file import is_hdf5
 
 Array = npt.NDArray[Any]
-# File types by the reader that takes them; `KINDS` is the list for error texts.
 KINDS = ".csv, .txt, .tsv, .dat (tables), .xlsx, .xlsm, .json, .jsonl, .ndjson, .npz, .npy, .mat, .h5 and .hdf5"
+"""File types that can be read, for messages."""
 TABLES = (".csv", ".txt", ".tsv", ".dat")
+"""File types that are read as text tables."""
 WORKBOOKS = (".xlsx", ".xlsm")
+"""File types that are read as workbooks."""
 RECORDS = (".json", ".jsonl", ".ndjson")
+"""File types that are read as JSON."""
 HDF5 = (".h5", ".hdf5")
+"""File types that are read as HDF5."""
 FOREIGN = (*TABLES, *WORKBOOKS, *RECORDS, ".npz", ".npy", ".mat")
 """File types that never hold our own recordings; HDF5 may."""
 
@@ -48,6 +52,7 @@ class Arrays:
 
     @property
     def name(self) -> str:
+        """Name of the file, without its folder."""
         return self.path.name
 
 

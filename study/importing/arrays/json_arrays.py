@@ -21,11 +21,15 @@ JSON_BYTES = 2**26
 _MOST_OBJECTS, _MOST_VALUES = 2**21, 2**24
 """Most records: each takes hundreds of bytes of memory."""
 _OURS = "hapteq"
+"""Beginning of the names of hapteq's own formats."""
 _OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
+"""The same in the bytes of a document."""
 _LOOKED_AT = 4096
 """Bytes at the start of a file in which a format of ours names itself."""
 _UNIT_KEYS = ("unit", "units")
+"""Keys beside values that state their unit."""
 _VALUE_KEYS = ("values", "value", "data", "samples")
+"""Keys of the values, beside a unit, where several keys hold lists; the first one found counts."""
 
 
 def read_json_arrays(path: Path) -> dict[str, Array]:

@@ -28,15 +28,19 @@ _CELL, _STRUCT, _OBJECT, _TEXT, _FIRST_NUMBER, _LAST_NUMBER, _OPAQUE = 1, 2, 3, 
 _COMPLEX = 0x0800
 """Flag of an array with an imaginary part."""
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+"""Type of the numbers of an element, by its number in the format."""
 _CLASSES = {
     6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",
 }  # fmt: skip
+"""Type of a numeric array, by the number of its class in the format."""
 _LEFT_OUT = {_TEXT: "a text", _OBJECT: "an object", 5: "a sparse matrix", 16: "a function"}
+"""Classes that hold no numbers, in words."""
 _SAVED_INSTEAD = {
     "a cell": "{plain}_1 = {name}{{1}}",
     "class timeseries": "{name} = struct('time', {name}.Time, 'values', {name}.Data)",
     "class table": "{name} = table2struct({name}, 'ToScalar', true)",
 }
+"""Statement of Matlab that makes a readable array of one that is left out, by a part of its description."""
 
 
 def instead(name: str, what: str) -> str:

@@ -20,7 +20,9 @@ from study.store.disk.hdf5_file import open_any_hdf5
 
 Array = npt.NDArray[Any]
 _PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Compressions that numpy.savez and numpy.savez_compressed use."""
 _CELL = "a cell, which is read where the file was saved with -v7"
+"""Words for a cell of Matlab, which stands in an HDF5 file as references."""
 _NO_NUMBERS = np.array(None, dtype=object)
 """Placeholder for texts and objects, which are reported but not read."""
 

@@ -11,17 +11,22 @@ Line = tuple[int, str]
 """A line with its number in the file, from 1."""
 
 NOT_AVAILABLE = "#n/a"
+"""Error value of spreadsheets that stands for a missing number."""
 EMPTY = (
     "", "nan", "-nan", "na", "n/a", "n.a.", NOT_AVAILABLE, "null", "none", "-", "--", "---", "1.#qnan", "-1.#qnan",
     "1.#ind", "-1.#ind", "nan(ind)", "-nan(ind)",
 )  # fmt: skip
+"""Fields, in lower case, that stand for a missing number."""
 COMMENTS = ("#", "%")
+"""Marks at the start of a line that is a comment."""
 _ERRORS = (NOT_AVAILABLE, "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
 """Cells of a spreadsheet that look like the beginning of a comment but are not."""
 _LONGEST_ERROR = 8
 """Characters of a spreadsheet's longest error value, such as `#DIV/0!`."""
 _LIKE_A_NUMBER = re.compile(r"[-+]?[.,]?\d[\d.,:/' \u00a0\u202f-]*(?:[dDeE][-+]?\d+)?(?P<rest>.*)")
+"""A field that begins as a number, date or clock time does; `rest` is what follows."""
 _BRACKETED = re.compile(r"[\[(].*[\])]")
+"""A unit in brackets."""
 
 
 def is_comment(line: str) -> bool:

@@ -19,9 +19,11 @@ from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import name_signal
 
 _DELIMITERS = (",", ";", "\t", "|", " ")
+"""Marks that are tried, in this order."""
 _SAMPLED = 32
 """Number of rows on which delimiters and decimal signs are tried."""
 _POINTED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
+"""A number whose points can separate thousands."""
 NO_THOUSANDS = "write numbers without signs between thousands"
 
 

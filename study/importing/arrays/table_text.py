@@ -20,7 +20,9 @@ _LOOKED_AT = 4096
 _READ_FOR_WORDS = 65536
 """Bytes from which an encoding is detected."""
 _ENCODINGS = ("gb18030", "shift_jis", "euc_jp", "euc_kr", "big5", "cp1251", "koi8_r", "cp1250", "cp1253")
+"""Encodings that are tried where a text is neither UTF-8 nor Western European."""
 _BEYOND_ASCII = re.compile(r"[^\x00-\x7f]+")
+"""A run of characters beyond ASCII."""
 _SHOWN = 24
 """Characters beyond ASCII that a message shows."""
 

@@ -19,9 +19,13 @@ if TYPE_CHECKING:
 Seconds = npt.NDArray[np.float64]
 
 _DATE = r"\d{4}(?P<between>[-/.])\d{1,2}(?P=between)\d{1,2}|\d{1,2}(?P<mark>[-/.])\d{1,2}(?P=mark)\d{4}"
+"""Year first, or last; the same mark twice."""
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d+|:\d{3})?)\s?(?P<half>[AaPp]\.?[Mm]\.?)?"
+"""Hour, minute, and second with its fraction behind a point, a comma or a colon; perhaps AM or PM."""
 _ZONE = r"\s?(?P<zone>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)"
+"""UTC, or an offset from it."""
 _STAMP = re.compile(rf"(?:(?P<date>{_DATE})(?:[T ]\s*|$))?(?:{_CLOCK}(?:{_ZONE})?)?")
+"""Date, clock time, or both; an empty text matches too."""
 DAY_S, HOUR_S = 86400.0, 3600.0
 STAMP_WORDS = "dates and clock times are understood as 2024-03-01T12:00:00.123, with or without a zone, or 12:00:00.123"
 

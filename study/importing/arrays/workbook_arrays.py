@@ -27,14 +27,19 @@ if TYPE_CHECKING:
     from openpyxl import Workbook
 
 _BEGIN_OF_OLD = b"\xd0\xcf\x11\xe0"
+"""First bytes of the container of .xls and of locked workbooks (OLE2)."""
 _DELIMITER = "\t"
+"""Delimiter of the lines that are made of a sheet."""
 _MOST_ROWS, _MOST_COLUMNS = 2**20, 2**14
 """Most rows and columns of a sheet, by the standard."""
 _MOST_CELLS = 2**24
+"""Most filled cells that are read of a sheet."""
 _MOST_STATED = 2**22
 """Most cells of a sheet: each takes a tenth of a millisecond; a text table is read a hundred times faster."""
 _NEVER_COMPUTED = re.compile(rb'<c (?![^<>]*t="str")[^<>]*><f[^<>]*(?:/>|>[^<]*</f>)(?:<v ?/>|<v></v>)?</c>')
+"""In a sheet's XML: a cell with a formula and no value, which is no text."""
 _PERCENT = re.compile(r"%|percent|pct", re.IGNORECASE)
+"""Words of a header whose column is percentages."""
 
 
 class _NotReadError(ValueError):

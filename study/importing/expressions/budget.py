@@ -14,6 +14,7 @@ DEEPEST = 200
 NUMBERS = 20_000_000
 """Numbers held at once (160 MB), plus 20 times as many as the files hold, up to LARGEST."""
 LARGEST = 400_000_000
+"""Most numbers held at once, for any file (3.2 GB)."""
 WORK = 500_000_000
 """Numbers computed in total (about 2 s), plus 500 times as many as the files hold."""
 _STEP = 10_000
@@ -55,6 +56,7 @@ class Budget:
 
     @contextmanager
     def deeper(self, text: str, levels: int = 1) -> Iterator[None]:
+        """Count levels of nesting while the block runs. Raises ImportProblemError beyond `DEEPEST`."""
         self._depth += levels
         try:
             if self._depth > DEEPEST:

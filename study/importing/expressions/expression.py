@@ -33,13 +33,16 @@ _OPERATIONS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Pow: np.power,
     ast.Mod: np.mod,
 }
+"""Operators between arrays, and what computes them."""
 _COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: np.less,
     ast.LtE: np.less_equal,
     ast.Gt: np.greater,
     ast.GtE: np.greater_equal,
 }
+"""Comparisons of arrays, and what computes them; the results count as 0 and 1."""
 ALLOWED = "allowed are numbers, names, + - * / ** %, < <= > >=, [ ] and the functions " + ", ".join(sorted(FUNCTIONS))
+"""What an expression may hold, for messages."""
 
 
 def evaluate(text: str, lookup: Lookup, clock: Clock, budget: Budget) -> Value:

@@ -25,6 +25,7 @@ class NoTime:
     """Clock of expressions for the rate and for the time stamps themselves, where no time is known."""
 
     def times_s(self, count: int) -> Value:
+        """Raises ValueError."""
         raise ValueError("there is no clock in this place yet")
 
 
@@ -55,6 +56,8 @@ class Namespace:
         return float(np.ravel(value)[0])
 
     def lookup(self, name: str, clock: Clock) -> Value:
+        """Value of an array or a definition; clock: whose times its expression may use. Raises ImportProblemError for
+        an unknown name."""
         if name in self.arrays:
             return self._numbers(name)
         if name in self.definitions:
@@ -67,6 +70,7 @@ class Namespace:
         )
 
     def has(self, name: str) -> bool:
+        """Whether there is an array or a definition of this name."""
         return name in self.arrays or name in self.definitions
 
     def list_names(self) -> str:

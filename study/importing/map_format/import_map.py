@@ -10,10 +10,14 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+"""Of every table of a map: no unknown keys, no NaN or infinity."""
 
 Resampling = Literal["", "held", "band-limited", "linear"]
+"""How samples are put onto the recording's grid; empty: they must lie on it."""
 SignalRole = Literal["command", "response", "position", "excitation", "condition", "helper"]
+"""What a channel is in the recording; a helper is not written."""
 Kind = Literal["multisine", "sweep", "sine", "slow", "noise", "binary", "step", "impact", "free", "rest"]
+"""Kind of the excitation of a segment."""
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -14,6 +14,7 @@ _LONGEST_SENTENCE = 2000
 _MOST_NAMES = 500
 """Known names with which an unknown one is compared."""
 _QUOTED = re.compile(rf"(?<!\w)'([^']{{{_LONGEST_WORD}}})[^']+'(?!\w)")
+"""A quotation longer than a message shows."""
 
 NOTHING_WRITTEN = "Nothing was written."
 

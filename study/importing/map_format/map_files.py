@@ -23,6 +23,7 @@ class PartFiles:
 
     @property
     def label(self) -> str:
+        """Name of the first clock's file, and the prefix of the part's arrays where it has one; for messages."""
         return self.file.name + (f" {self.part.prefix}*" if self.part.prefix else "")
 
 

@@ -14,6 +14,7 @@ from study.importing.map_format.import_map import ImportMap
 from study.store.disk.file_errors import UnusableFileError
 
 KIND = "import map"
+"""What messages call a map."""
 
 _ADAPTER: TypeAdapter[ImportMap] = TypeAdapter(ImportMap)
 MAP_SCHEMA: Node = _ADAPTER.json_schema()
@@ -123,6 +124,7 @@ _FREE = (
     '; for a device that moves freely, write a force of zero for each axis: [[computed]] with role = "command", '
     'name = "none", value = "0 * clock_s", unit = "N" ("N m" for angles)'
 )
+"""Advice where commands are missing."""
 
 
 def _roles(found: ImportMap) -> Iterator[str]:
@@ -134,6 +136,7 @@ def _roles(found: ImportMap) -> Iterator[str]:
 
 
 _RESAMPLED = {"zero-order": "held", "linear": "linear", "band-limited": "band-limited"}
+"""How commands are resampled, by the `hold` of the map."""
 
 
 def _check_hold(found: ImportMap) -> Iterator[str]:

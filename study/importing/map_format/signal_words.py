@@ -22,11 +22,14 @@ from equalizer.signals.units import (
 from study.importing.map_format.import_map import SignalRole
 
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]+(?:\([^\[\]()]*\))?)[\])]\s*")
+"""A name followed by its unit in brackets."""
 _SAID_BEHIND = re.compile(r"(?<=\w)(?:\s*/\s*|\s*,\s+|\s+in\s+)(?=\S)")
 """Units behind a slash, comma or `in` (`force / N`, `force, N`, `Kraft in N`), as in standards and of testing
 machines."""
 _NO_UNITS = ("n/a", "na", "none", "-", "--")
+"""Words in the place of a unit that say that there is none."""
 _PEAK = re.compile(r"(?<![a-z])(peak|pk|rms)\b|(?<=[av])(peak|pk|rms)\b", re.IGNORECASE)
+"""Marks of a unit that stands for a peak or an rms value."""
 LONGEST_NAME = 300
 """Longest name in characters; the search for a unit takes quadratic time."""
 _REMEMBERED = 2**14
@@ -44,17 +47,20 @@ _FOREIGN = {
     "temperature": ("温度", "온도", "температура", "θερμοκρασία"),
     "pressure": ("压力", "圧力", "압력", "давление", "πίεση"),
 }
+"""Words of other scripts for a quantity."""
 FOREIGN_WORDS = {word: quantity for quantity, words in _FOREIGN.items() for word in words}
 """Words in other scripts, by which an encoding is recognised, and the quantity of each."""
 _SURE = ("rad", "mrad", "rpm", "kN", "N m", "mN m")
 """Units that are unambiguous at the end of a name, unlike `A` in `phase_A`; so are those with a slash."""
 _WRITTEN_TOGETHER = {"Nm": "N m", "N_m": "N m", "mNm": "mN m", "Ncm": "N cm", "lbfin": "lbf in", "mps": "m/s"}
+"""Units written without blanks or slashes, as in names, and what they stand for."""
 _SAID: dict[str, SignalRole] = {
     **dict.fromkeys(("command", "cmd", "commanded", "comando", "mando", "befehl", "commande"), "command"),
     **dict.fromkeys(("ref", "reference", "target", "setpoint", "desired"), "helper"),
     **dict.fromkeys(("referencia", "sollwert", "consigne"), "helper"),
     **dict.fromkeys(("supply", "battery", "bus", "ambient", "setting"), "condition"),
 }  # fmt: skip
+"""Roles by a word of a name."""
 _SHORT: dict[str, SignalRole] = {"u": "command", "y": "response"}
 """Textbook names of input and output, if both exist and there is no `x`: `y` would then be an axis."""
 _ALONE: dict[str, SignalRole] = {
@@ -83,6 +89,7 @@ class ParsedName:
 
     @property
     def sure(self) -> bool:
+        """Whether the interpretation is certain: there is no `doubt`."""
         return not self.doubt
 
 
