@@ -26,7 +26,9 @@ from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 
 APART = "study.evaluation.challenge"
+"""Package that makes the cases: it cannot be imported, nor its files opened, while cases are answered."""
 OPENED = ("open", "os.listdir", "os.scandir", "os.chdir", "os.rename", "os.link", "os.symlink", "shutil.copyfile")
+"""Audit events of Python for files and folders that are opened or linked."""
 STARTED = ("subprocess.Popen", "os.exec", "os.posix_spawn", "os.spawn", "os.system", "os.fork", "os.forkpty")
 """Audit events of Python. HDF5 opens files in C without such events; it only gets paths that this module built."""
 

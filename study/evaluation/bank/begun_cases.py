@@ -15,6 +15,7 @@ from study.store.disk.atomic_write import sync_folder
 from study.store.disk.text_file import read_text
 
 NAME_BYTES = 6
+"""Random bytes of a case's name, which says nothing of its number."""
 
 
 def begin_case(folder: ProofFolder) -> Path:

@@ -31,6 +31,7 @@ from study.store.formats.recording_file import write_recording
 NEXT = "next"
 """Folder of the follow-up cases: a bank of its own, whose labels name the case they follow."""
 FURTHER = "recording_{}.h5"
+"""File of a further recording, by its number."""
 PROPOSED, DRAWN = "proposed", "drawn"
 NOISE_SEED = 7
 """Keeps the noise and the random order of follow-ups apart from all other draws of a case."""

@@ -19,25 +19,31 @@ class ProofFolder:
 
     @property
     def open(self) -> Path:
+        """Folder of the cases, one folder each, as the diagnosis gets them."""
         return self.path / "open"
 
     @property
     def begun(self) -> Path:
+        """Folder of the cases that are being written."""
         return self.path / "begun"
 
     @property
     def sealed(self) -> Path:
+        """Folder of the truths."""
         return self.path / "sealed"
 
     @property
     def seals(self) -> Path:
+        """File with the hash of each truth."""
         return self.path / "labels.sha256"
 
     @property
     def log(self) -> Path:
+        """File with what the processes of the diagnosis wrote to stderr."""
         return self.path / "engine.log"
 
     def label(self, number: int) -> Path:
+        """File of the truth of a case, by its number."""
         return self.sealed / f"{number:05d}.json"
 
 

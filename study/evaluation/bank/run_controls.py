@@ -19,6 +19,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
 
 SHORT = Rig((0,), 1000, 3, steps=80)
+"""One axis and three periods of 1000 samples: a control asks what is said, not how well."""
 
 
 def run_controls(

@@ -36,6 +36,7 @@ class BankOptions:
 
     @property
     def answering(self) -> Workers:
+        """Who diagnoses: the executor, or that many processes of this computer."""
         return self.workers if self.executor is None else self.executor
 
 

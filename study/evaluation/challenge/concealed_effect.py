@@ -12,7 +12,9 @@ from study.evaluation.challenge.bench import Bench
 from study.evaluation.challenge.device import Device
 
 Place = Literal["mechanism", "hand", "actuator", "sensor"]
+"""Where an effect acts on the way from the command to the record."""
 Values = Mapping[str, float]
+"""Drawn parameters of an effect, by name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

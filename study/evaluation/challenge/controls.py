@@ -16,7 +16,9 @@ from study.evaluation.challenge.sensor import NOISE_MPS2
 CONCEALED, STRONG = "force_saturation", 0.9
 """Effect and strength of the control cases: it acts on one axis, and no other effect resembles it."""
 PUSHED = "constant_force"
+"""Effect of the control whose signs are mirrored."""
 WRONG = "mains_hum"
+"""The only hypothesis that is left to the control with a wrong catalogue."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,3 +170,4 @@ CONTROLS = (
     Control("other names of device and channels", "same but axes", _rename_channels),
     Control("a catalogue of one wrong hypothesis", "not explained", _allow_one_wrong),
 )
+"""All controls: name, claim, and how their inputs are drawn."""

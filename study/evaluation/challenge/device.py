@@ -63,6 +63,8 @@ class Device:
     """Integration steps per sample."""
 
     def mechanism(self) -> Mechanism:
+        """Parameters of the simulation's kernel, in SI units. The motor's mass is taken off the axis with play, behind
+        which it moves by itself."""
         mass, damping, stiffness = self.bench.matrices()
         axis = int(self.play[AXIS])
         if axis >= 0:

@@ -15,7 +15,10 @@ from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.second_engine import second_engine
 
 Kind = Literal["nothing", "single", "pair", "outside", "without"]
+"""How many effects are missing in the model: none, one, two; one outside the catalogue; or one that the diagnosis is
+not allowed to name."""
 Bank = Literal["main", "dirty", "engine"]
+"""Ordinary extras, twice as large ones, or the second engine without any."""
 
 COUNTS: dict[tuple[Kind, Bank], int] = {
     ("nothing", "main"): 8, ("nothing", "dirty"): 1, ("nothing", "engine"): 1,
@@ -24,6 +27,7 @@ COUNTS: dict[tuple[Kind, Bank], int] = {
 }  # fmt: skip
 """Number of devices of each kind and bank in a turn of forty."""
 TURN: tuple[tuple[Kind, Bank], ...] = tuple(each for each, count in COUNTS.items() for _ in range(count))
+"""Kind and bank of each case of a turn; the turn repeats."""
 EXTRAS: dict[Bank, float] = {"main": 1.0, "dirty": 2.0, "engine": 0.0}
 """Size of the concealed extras, relative to that of the main bank."""
 LOWEST: dict[Kind, float] = {"nothing": 0.0, "single": 0.0, "pair": 0.4, "outside": 0.3, "without": 0.4}

@@ -30,6 +30,7 @@ DECOYS: dict[str, ConcealedEffect] = {effect.name: effect for effect in decoys.D
 """Effects outside the vocabulary."""
 
 Concealed = Literal["calibrated", "retuned"]
+"""How the given model was made: `calibrated` from the device without the effect, `retuned` on the recording itself."""
 MotionPair = tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 """Acceleration and position of a first device, then of a second."""
 

@@ -11,6 +11,7 @@ from study.evaluation.challenge.rig import WHOLE, Rig
 RATE_HZ = 1000.0
 """Sample rate of all challenge recordings."""
 AXES = ("x", "y", "z")
+"""Names of the bench's axes."""
 LEVELS_N = (0.5, 1.5, 3.0)
 """Peaks of the multisines."""
 PERIOD, PERIODS, TEST_PERIODS = 2000, 4, 2

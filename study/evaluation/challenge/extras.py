@@ -14,6 +14,7 @@ from study.evaluation.challenge.friction_kernel import NEGATIVE, POSITIVE, STIFF
 from study.evaluation.challenge.handle_force_kernel import CUBE, DRAG, PHASE, PITCH, RIPPLE
 
 Extra = Callable[[Device, float, np.random.Generator], Device]
+"""extra(device, factor, random): the device with it, of a random size."""
 COUNT = 4
 """Unlabelled effects per device."""
 
@@ -84,3 +85,4 @@ EXTRAS: tuple[Extra, ...] = (
     _mix_channels,
     _add_hum,
 )
+"""Extras that are drawn from."""

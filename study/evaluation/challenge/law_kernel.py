@@ -9,6 +9,7 @@ from equalizer.signals.signal import FloatArray
 KIND, AXIS, OTHER, FACTOR, FIRST, SECOND, SIDE = range(7)
 """Columns of a row: law; axis on which it acts; another axis; its three parameters; +1 or -1 for a side."""
 COLUMNS = 7
+"""Columns of a row."""
 (
     SPEED_POWER, PLACE_POWER, PLACE_DRAG, SPEED_SPRING, ATTRACTION, SOFT_DRAG, SOFT_SPRING, FADING_DRAG, CONTACT,
     EDGE_DRAG, GAIN_RIPPLE, PUMPED, RELAXATION, HEATING, CROSS_SQUARE, CROSS_SPRING, CROSS_DRAG, WHIRL, ALL_DRAG,

@@ -26,3 +26,4 @@ class Rig:
 
 
 WHOLE = Rig()
+"""Three axes, four periods of 2000 samples, no unlabelled effects."""

@@ -14,6 +14,7 @@ from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import read_text, write_text
 
 SEAL_SUFFIX = ".sha256"
+"""Added to the name of the table."""
 CORRECT = "Correct it before it is sealed; from then on nothing in it may be changed."
 
 

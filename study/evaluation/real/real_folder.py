@@ -27,6 +27,7 @@ class RealRecording:
 
     @property
     def name(self) -> str:
+        """Name of the recording, by its map."""
         return self.found.name
 
     def model(self) -> MechanicalModel | None:

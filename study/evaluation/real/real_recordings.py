@@ -42,6 +42,7 @@ from study.workflows.forked_map import processor_s, without_forking
 from study.workflows.run_on_executor import finished_pieces
 
 RETUNED_NAME = "retuned.toml"
+"""Re-tuned model, in the folder of a recording's answer."""
 DIAGNOSED_OF_BOTH = 0.5
 """Progress at which the injection of faults begins."""
 EVALUATIONS = 4000

@@ -28,6 +28,7 @@ _PLACEMENTS = (
     _Placement("edge", EDGE, False),
     _Placement("in the hand", CENTRE, True),
 )
+"""Where the methods are compared."""
 
 
 def play_baselines(

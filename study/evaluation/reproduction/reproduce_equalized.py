@@ -32,6 +32,7 @@ class PlacedModels:
 
     @property
     def workspace(self) -> WorkspaceModels:
+        """Models of the centre and of the places beside it, for interpolation."""
         return WorkspaceModels((self.centre, *self.between))
 
 

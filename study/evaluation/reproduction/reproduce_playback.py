@@ -23,6 +23,7 @@ from study.session.stimulus.limits import limits_of_recording
 from study.store.formats.protocol_files import read_recording_protocol
 
 AXES = ("ax", "ay", "az")
+"""Names of the channels of a wanted acceleration."""
 PEAK_OVER_CAP = 0.93
 """Peak force of everything that is played, as a fraction of the cap: far above friction, below the cap."""
 PERIODS = 2

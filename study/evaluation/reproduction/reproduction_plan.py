@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 Place = tuple[float, float, float]
+"""Position of the handle, x, y, z (m)."""
 
 CENTRE: Place = (0.0, 0.0, 0.0)
+"""Centre of the workspace."""
 EDGE: Place = (0.0, 0.05, 0.0)
 """Near the edge of a workspace whose soft stops begin at 75 mm."""
 BETWEEN: tuple[Place, ...] = ((0.0, 0.03, 0.0), (0.0, 0.065, 0.0))
@@ -44,18 +46,22 @@ class ReproductionPlan:
 
     @property
     def study(self) -> Path:
+        """Data folder of the simulated participants."""
         return self.out / "study"
 
     @property
     def recordings(self) -> Path:
+        """Folder of the recordings of the simulated device."""
         return self.out / "recordings"
 
     @property
     def models(self) -> Path:
+        """Folder of the identified models."""
         return self.out / "models"
 
     @property
     def figures(self) -> Path:
+        """Folder of the figures."""
         return self.out / "figures"
 
 

@@ -26,6 +26,7 @@ from study.store.formats.reproduction_file import REPRODUCTION_NAME, write_repro
 from study.workflows.picture_files import write_pictures
 
 PAGE_NAME = "report.html"
+"""Page of the reproduction, in its folder."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank
 from study.store.disk.provenance import sha256_of
 
 LAWS = "laws"
+"""Says in bank.json that laws are concealed."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,6 +57,7 @@ def fresh_motions(path: Path, axes: Sequence[str], pushed: Sequence[str], respon
 
 
 _KEPT = ("position", "velocity", "acceleration", "command", "reading", "lawful")
+"""Arrays of a fresh motion that are sealed; the first four give the variables x, v, a and f of an axis."""
 
 
 def _fresh_motion(of: dict[str, Any], axes: Sequence[str], pushed: Sequence[str], response: bool) -> FreshMotion:

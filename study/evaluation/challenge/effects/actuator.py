@@ -66,3 +66,4 @@ EFFECTS = (
     ConcealedEffect("transport_delay", "actuator", False, _draw_delay, _build_delay),
     ConcealedEffect("force_gain", "actuator", True, _draw_gain, _build_gain),
 )
+"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""

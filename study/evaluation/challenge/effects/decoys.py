@@ -105,3 +105,4 @@ DECOYS = (
     ConcealedEffect("tired_motor", "actuator", True, _draw_tired, _build_tired),
     ConcealedEffect("force_hysteresis", "actuator", True, _draw_iron, _build_iron),
 )
+"""As `EFFECTS` of the other files; the names are none of the vocabulary."""

@@ -80,3 +80,4 @@ EFFECTS = (
     ConcealedEffect("presliding_hysteresis", "mechanism", True, _draw_presliding, _build_presliding),
     ConcealedEffect("position_dependent_friction", "mechanism", True, _draw_along, _build_along),
 )
+"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""

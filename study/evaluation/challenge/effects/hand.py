@@ -59,3 +59,4 @@ EFFECTS = (
     ConcealedEffect("hand_impedance", "hand", False, _draw_hand, _build_hand),
     ConcealedEffect("time_varying_grip", "hand", False, _draw_grip, _build_grip),
 )
+"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""

@@ -111,3 +111,4 @@ EFFECTS = (
     ConcealedEffect("extra_mode", "mechanism", True, _draw_mode, _build_mode),
     ConcealedEffect("backlash", "mechanism", True, _draw_backlash, _build_backlash),
 )
+"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""

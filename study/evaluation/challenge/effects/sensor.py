@@ -181,3 +181,4 @@ EFFECTS = (
     ConcealedEffect("sensor_offset", "sensor", True, _draw_offset, _build_offset),
     ConcealedEffect("logger_offset", "sensor", False, _draw_logger, _build_logger),
 )
+"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""

@@ -83,3 +83,4 @@ EFFECTS = (
     ConcealedEffect("cogging", "mechanism", True, _draw_cogging, _build_cogging),
     ConcealedEffect("end_stop", "mechanism", True, _draw_stop, _build_stop),
 )
+"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""

@@ -12,6 +12,7 @@ DERIVATIVE = {
     "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2, "voltage": 0,
     "angular velocity": 1, "angular speed": 1, "angular acceleration": 2,
 }  # fmt: skip
+"""Time derivative of the position that a quantity is; voltage counts as position."""
 WIDEST, LOUD = 0.15, 30.0
 """Upper limit of differentiation: this fraction of the sample rate, or the last frequency with this many times the
 noise power."""
@@ -36,6 +37,7 @@ class AxisMotion:
 
     @property
     def seconds(self) -> float:
+        """Duration: samples over rate (s)."""
         return len(self.q) / self.rate_hz
 
     @property

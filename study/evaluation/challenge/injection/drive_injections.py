@@ -148,3 +148,4 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
         actuator=True,
     ),
 )
+"""Faults of the drive: name, draw of the parameters, and the command that would have been needed."""

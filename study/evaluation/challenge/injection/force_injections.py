@@ -104,3 +104,4 @@ FORCE_INJECTIONS: tuple[ForceInjection, ...] = (
     ),
     *DRIVE_INJECTIONS,
 )
+"""Faults of mechanism and drive: name, draw of the parameters, and the command that would have been needed."""

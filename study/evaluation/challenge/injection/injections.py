@@ -35,6 +35,7 @@ from study.evaluation.challenge.injection.reading_faults import (
 )
 
 MAINS_HZ = (50.0, 60.0)
+"""Nominal frequencies of the mains, of which hum has one (Hz)."""
 FASTEST_PPM = 2e4
 """Largest drawn clock error (ppm): that of oscillators without a crystal."""
 
@@ -145,6 +146,7 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection("cross_axis_sensitivity", lambda at, s, r: {"from_next": _log_between(0.02, 0.8, s)}, cross, axes=2),
     Injection("sensor_misalignment", _draw_turn, turn, axes=3),
 )
+"""Faults of sensor, clock and line: name, draw of the parameters, and the change of the response."""
 
 
 def inject(recording: Recording, effect: str, strength: float, random: np.random.Generator) -> Injected:

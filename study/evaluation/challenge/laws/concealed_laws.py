@@ -15,6 +15,7 @@ from study.evaluation.challenge import law_kernel as kernel
 
 Random = np.random.Generator
 ActsOn = Literal["force", "command", "response"]
+"""What a law changes: the force on the handle, the command, or the reading."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,4 +148,6 @@ LAW_KINDS: tuple[LawKind, ...] = (
     LawKind("sensor of two axes", "rx + s k rx ry", _no_parameters, ("ax ay",), acts_on=("response",), axes=2,
             change=lambda r, other, a, b: r * other),
 )  # fmt: skip
+"""All families of laws, in the order in which they take turns."""
 LAW_OF_NAME = {kind.name: kind for kind in LAW_KINDS}
+"""Families by name."""

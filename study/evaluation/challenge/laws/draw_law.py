@@ -25,12 +25,17 @@ from study.evaluation.challenge.rig import Rig
 from study.evaluation.challenge.sensor import read
 
 LawBankKind = Literal["law", "nothing", "decoy", "mode"]
+"""What is concealed: a law, nothing, an effect of the catalogue, or a linear mode."""
 COUNTS: dict[LawBankKind, int] = {"law": 12, "nothing": 4, "decoy": 3, "mode": 1}
+"""Devices of each kind in a turn of twenty."""
 TURN: tuple[LawBankKind, ...] = tuple(kind for kind, count in COUNTS.items() for _ in range(count))
+"""Kind of each case of a turn; the turn repeats."""
 LOWEST = 0.35
 """Lowest strength of what is concealed."""
 MODE = "extra_mode"
+"""Effect of the kind `mode`."""
 CATALOGUED = tuple(name for name in EFFECTS if name not in (*ALL_AXES, MODE, "hand_impedance"))
+"""Effects of the kind `decoy`: those that a single axis shows."""
 ONE_AXIS = 0.75
 """Fraction of single-axis laws that are built into a device of one axis."""
 LOUD_N = 4.5

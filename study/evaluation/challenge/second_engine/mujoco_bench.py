@@ -19,12 +19,14 @@ from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 STEPS = 10
 """Integration steps per sample."""
 STEP_S = 1.0 / (RATE_HZ * STEPS)
+"""Step of integration (s)."""
 HANDLE_SHARE = 0.4
 """Mass of the handle's body over that of the lightest axis. The rest of an axis's mass moves with that axis alone."""
 CONTACT = 0.01
 """Impedance of a contact: small, so that spring and damper have their nominal values."""
 
 Values = Mapping[str, float]
+"""Drawn parameters of an effect, by name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

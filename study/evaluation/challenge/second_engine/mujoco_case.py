@@ -28,6 +28,7 @@ from study.evaluation.challenge.second_engine.mujoco_bench import MujocoBench, b
 from study.evaluation.challenge.sensor import RANGE_MPS2, read
 
 Build = Callable[[MujocoBench, int, Values], MujocoBench]
+"""build(bench, axis, values): the bench with an effect."""
 
 
 def draw_mujoco_case(
@@ -124,5 +125,6 @@ BUILDERS: dict[str, Build] = {
     "amplifier_lag": lambda b, axis, v: replace(b, lag_s=v["time_constant"]),
     "transport_delay": lambda b, axis, v: with_delay(b, v["delay"]),
 }
+"""Effects that this engine simulates."""
 IN_THE_SENSOR = ("sensor_lag", "sensor_gain")
 """Effects after the engine, in the same sensor chain."""
