@@ -25,6 +25,7 @@ starting anew."""
 POLL_S = 1.0
 """Interval in seconds at which the workers are counted."""
 KEPT = "What was finished is kept."
+"""What was saved, in errors of a cluster."""
 INSTALL = "pip install 'hapteq[cluster]'"
 
 

@@ -37,6 +37,7 @@ _lost: set[CodeType | type] = set()
 _spent_s = [0.0]
 """Processor time of the processes from which this one was forked, until then."""
 _within: list[bool] = []
+"""Not empty within a piece of work: no further processes are started there."""
 
 
 def processor_s() -> float:

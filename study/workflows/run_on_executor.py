@@ -14,6 +14,7 @@ Result = TypeVar("Result")
 AHEAD = 100
 """Largest number of pieces in flight, chosen by hand: it bounds the inputs and results in memory."""
 _FREED_BYTES = 30 * 2**20
+"""Size of the block that is allocated and freed: below the 32 MB up to which glibc raises its limit."""
 
 
 def finished_pieces(

@@ -18,7 +18,9 @@ from pathlib import Path
 from study.session.views.views import DeviceFinding
 
 SOURCE = Path(__file__).with_name("bare_loop.c")
+"""The loop, compiled when it is measured."""
 COMPILERS = ("cc", "gcc", "clang")
+"""C compilers that are looked for, in this order."""
 PRIORITY = 40
 """Real-time priority, as that of a device's loop."""
 
@@ -32,6 +34,7 @@ COMPILING_S = 120.0
 OVERTIME_S = 30.0
 """Longest delay of the C loop's end beyond its duration (s)."""
 NAME = "Bare C loop"
+"""Title of the finding."""
 ADVICE = (
     "The computer can do better than this loop did: close other programs, measure again, and report it if it stays."
 )

@@ -32,6 +32,7 @@ MM_PER_M = 1000.0
 
 
 CENTRE_M = (0.0, 0.0, 0.0)
+"""Where the handle belongs without a place of its own (m)."""
 
 
 def check_device(

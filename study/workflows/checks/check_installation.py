@@ -20,7 +20,9 @@ from study.session.views.views import DeviceFinding
 from study.store.disk.privacy import privacy_warning
 
 HAPTEQ = "hapteq"
+"""Name of the installed distribution."""
 IMPORT_NAMES = ("study", "analysis", "equalizer", "protocols")
+"""Packages of hapteq that a foreign package of the same name could hide."""
 
 SMALLEST = (80, 24)
 """Columns and rows of a terminal in which every screen fits."""

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from analysis.device_change.measure_device import NotMeasurableError
 
 PROTOCOL = "daily_check"
+"""Shipped recording protocol of the check, and of the acceptance."""
 BASELINES, CHECKS = "baselines", "daily_checks"
 """Folders beside the acceptance."""
 

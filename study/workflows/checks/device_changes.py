@@ -16,8 +16,11 @@ CAUSES = {
     "response": "Look for a loose screw at handle, sensor, base or table, and at the cable.",
     "noise": "Look at the sensor's plug, cable and shield, and at what shakes the table.",
 }
+"""What to look for, by the kind of change."""
 FRICTION_FIRST = "That may come from the friction: mend it first."
+"""Advice where gain or response changed together with the friction."""
 TOO_NOISY = "It was measured too inaccurately: close other programs, keep the table still, and check again."
+"""Advice where a change could not be told."""
 IF_IT_STAYS = "If it stays, name the cause with `hapteq diagnose`, or accept the device anew."
 
 

@@ -14,6 +14,7 @@ from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
+"""Name of an effect and of its file."""
 TEXT = """\"\"\"{about}\"\"\"
 
 from equalizer.effects.law_entry import LawEntry
@@ -34,6 +35,7 @@ ENTRY = LawEntry(
     signature={signature!r},
 )
 """
+"""Text of an effect's file; the values are filled in."""
 
 
 def write_entry(found: Path, out: Path, number: int = 1) -> LawEntry:

@@ -18,6 +18,7 @@ from study.workflows.diagnosis.diagnosis_input import read_input
 from study.workflows.free_name import require_free
 
 TITLE = "The model was not made"
+"""Title of each error of this command."""
 
 
 @dataclass(frozen=True, slots=True)

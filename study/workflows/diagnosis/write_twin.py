@@ -31,6 +31,7 @@ from study.workflows.free_name import require_free
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
 TITLE = "The model was not made"
+"""Title of each error of this command."""
 STANDARD_GRAVITY = 9.80665
 """m/s², exact by definition."""
 SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)

@@ -15,7 +15,9 @@ from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text
 
 FORMAT = "hapteq-anova"
+"""Format of anova.json."""
 KIND = "analysis of a study"
+"""What messages call such a file."""
 ANALYSE = "Give the anova.json that `hapteq analyze` writes for a study with two participants or more."
 
 

@@ -85,6 +85,8 @@ class PlayedTransient:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPlay:
+    """A transient at a contact, as wanted, as predicted by the model, and as played in two ways."""
+
     plan: ContactPlan
     normal: FloatArray
     """(3,), of length 1."""
@@ -108,7 +110,7 @@ def play_contact(
     transient = _transient(plan)
     models = read_playback_models((plan.model,), None, plan.weight)
     require_device_alone(models)
-    model, rate_hz = models.nearest, models.nearest.sample_rate_hz
+    model, rate_hz, band_hz = models.nearest, models.nearest.sample_rate_hz, models.band_hz
     try:
         require_rate(transient, rate_hz)
         recording = plan.scale * transient.signal.samples[:, 0]
@@ -122,14 +124,12 @@ def play_contact(
         _within_cap(_plain_forces(model, wanted), plan, rate_hz),
     )
     measured = _play_both(plan, models, forces, on_progress, before_moving)
-    in_band = band_part(wanted, rate_hz, models.band_hz)
+    in_band = band_part(wanted, rate_hz, band_hz)
     equalized, plain = (
-        PlayedTransient(
-            sent, band_part(came, rate_hz, models.band_hz), band_error(wanted, came, rate_hz, models.band_hz)
-        )
+        PlayedTransient(sent, band_part(came, rate_hz, band_hz), band_error(wanted, came, rate_hz, band_hz))
         for sent, came in zip(forces, measured, strict=True)
     )
-    done = ContactPlay(plan, normal, rate_hz, models.band_hz, in_band, start, equalized, plain)
+    done = ContactPlay(plan, normal, rate_hz, band_hz, in_band, start, equalized, plain)
     _write(done, models)
     return done
 
@@ -172,8 +172,7 @@ def _fade_out(forces: FloatArray, rate_hz: float) -> FloatArray:
 
 
 def _plain_forces(model: IdentifiedModel, wanted: FloatArray) -> FloatArray:
-    lines_hz = np.geomspace(*model.band_hz, GAIN_LINES)
-    return np.asarray(static_gain(model, lines_hz).response[0, 0, 0].real * wanted)
+    return np.asarray(static_gain(model, np.geomspace(*model.band_hz, GAIN_LINES)).response[0, 0, 0].real * wanted)
 
 
 def _within_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
@@ -265,6 +264,7 @@ def _plays(done: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
 
 
 def contact_summary(done: ContactPlay) -> dict[str, Any]:
+    """Figures of contact.json and `--json`: relative errors in the band, and the highest force (N)."""
     return {
         "out": str(done.plan.out),
         "normal": done.normal.tolist(),

@@ -32,6 +32,7 @@ FAR_M = 0.005
 """Distance from the place of a single model beyond which the user is warned."""
 
 Vector = tuple[float, float, float]
+"""x, y, z."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,6 +23,7 @@ from study.workflows.picture_files import write_pictures
 FREER = 1.5
 """Factor between the bound on the decay time and the slowest decay found."""
 PAGE_NAME = "report.html"
+"""Page about the model, in the folder of results."""
 
 
 def report_identification(device: IdentifiedDevice, folder: Path, on_progress: Callable[[float], None]) -> Path:

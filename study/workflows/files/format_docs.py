@@ -39,7 +39,8 @@ from study.workflows.files.importing_docs import importing_markdown
 
 
 def event_schema() -> dict[str, Any]:
-    schema = EVENTS.json_schema()  # each event may carry the checksum that the log adds
+    """JSON schema of a fact; each may carry the checksum that the log adds."""
+    schema = EVENTS.json_schema()
     for event in schema["$defs"].values():
         if "event" in event.get("properties", {}):
             event["properties"]["chain"] = {"type": "string", "pattern": f"^[0-9a-f]{{{log_chain.DIGITS}}}$"}
@@ -47,6 +48,7 @@ def event_schema() -> dict[str, Any]:
 
 
 def session_log_markdown() -> Iterable[str]:
+    """Paragraphs on the session log and its seal."""
     yield "## Session log (`events.jsonl`) and its seal (`seal.json`)"
     yield (
         "One JSON object per line, appended and never changed; each is a fact of the schema `session_event.json`. "
@@ -71,7 +73,6 @@ def session_log_markdown() -> Iterable[str]:
 
 
 _PLAIN = ", ".join(f"`{name}`" for name in FUNCTIONS if name not in MEMORY)
-
 LAWS = "\n\n".join(
     (
         f"A law that the catalogue has no name for is an effect `{DISCOVERED_LAW}`. A model says its formula:",
@@ -89,9 +90,8 @@ LAWS = "\n\n".join(
         "Signals are `x`, `vx`, `ax`, `fx` (position, velocity, acceleration, command of the x axis; y, z likewise), "
         "`t` (seconds from the first sample), or the recording's own channels. Where these do not end in x, y, z, the "
         "axes are called so in their order. A law of the force knows the recording's conditions, too, as `c1`, `c2`, … "
-        "where a condition's channel is no such name, or means something else. "
-        "A law of a command knows commands and `t`, one of a response "
-        "knows responses and `t`.",
+        "where a condition's channel is no such name, or means something else. A law of a command knows commands and "
+        "`t`, one of a response knows responses and `t`.",
         "Numbers with a point or exponent (`4.1`, `1e-3`) are free: a fit may move them. Whole numbers (`2`) belong "
         f"to the form. A formula has up to {LONGEST} characters and {LARGEST} parts, and up to {DEEPEST} numbers at "
         "once. It compares nothing: `maximum(x - 0.01, 0)` is a stop, `(1 + sign(vx))/2` is 1 on the way up.",

@@ -125,6 +125,7 @@ def _unit_problem(channel: ChannelMap | ComputedMap) -> str:
 
 
 _PROTOCOL_KEYS = {key for kind in ADAPTERS for key in protocol_schema(kind)["properties"]}
+"""Keys by which a TOML file is taken for a protocol, of any kind."""
 
 
 def recognise_protocol(content: FileContent) -> str | None:

@@ -25,6 +25,7 @@ from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import result_problems
 
 KIND = "session"
+"""What messages call a session."""
 
 DOCUMENTS = {
     SUMMARY_FORMAT: ("session summary", ("session", "subject", "protocol", "device", "runs", "answers", "closed")),
@@ -145,3 +146,4 @@ def _describe(folded: FoldedSession) -> str:
 
 
 SESSION_RECOGNISERS = (recognise_session, recognise_document, recognise_lock)
+"""Asked in this order; the first that recognises a file answers."""

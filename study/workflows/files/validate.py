@@ -25,6 +25,7 @@ KNOWN = (
     "(TOML), trajectories, forces, trials and thresholds (CSV), diagnoses and other JSON documents with format and "
     "version, and session folders"
 )
+"""What `hapteq validate` recognises, for messages."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from study.devices.opening import LinkageSource
 
 TITLE = "The linkage was not calibrated"
+"""Title of each error of this command."""
 SAVED = "Nothing moved and nothing was written."
 LARGEST_M = 0.2
 """Largest radius and depth of the grid (m). By hand."""

@@ -29,6 +29,7 @@ from study.store.formats.recording_layout import FORMAT
 from study.workflows.free_name import require_free
 
 Progress = Callable[[float], None]
+"""Called with the share that is done, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,10 @@ from study.workflows.picture_files import write_pictures
 from study.workflows.recording.recording_from import read_any_recording
 
 PAGE_NAME = "report.html"
+"""Page about the recordings, in the folder of results."""
 
 Progress = Callable[[float], None]
+"""Called with the share that is done, 0 to 1."""
 
 
 def look_at(paths: Sequence[Path], on_progress: Progress = lambda share: None) -> tuple[Overview, ...]:

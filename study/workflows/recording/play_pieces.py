@@ -33,10 +33,12 @@ class PlayedPiece:
 
     @property
     def played_n(self) -> float:
+        """Amplitude as finally played (N); below `requested_n` where something clipped before."""
         return self.piece.segment.amplitude
 
     @property
     def clipped(self) -> bool:
+        """Whether something was at its limit in the kept take too."""
         return is_clipped(self.health)
 
 

@@ -38,6 +38,7 @@ class RecordingPlan:
 
     @property
     def total_s(self) -> float:
+        """Duration of all pieces once each (s), at the nominal rate, without repeats and pauses."""
         return sum(piece.commands.duration_s for piece in pieces(self.protocol, NOMINAL_RATE_HZ))
 
 

@@ -16,6 +16,7 @@ OURS = ("thresholds", "medians", "units", "psychometric", "psychometric-*", "del
 
 STATISTICS_NAME, PAGE_NAME = "anova.json", "report.html"
 OUR_FILES = (THRESHOLDS_NAME, DETECTION_NAME, STATISTICS_NAME, PAGE_NAME)
+"""Files of an analysis beside its figures; the page is written last."""
 
 
 def is_analysis_of(out: Path, log: Path) -> bool:

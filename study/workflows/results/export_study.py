@@ -27,12 +27,14 @@ from study.workflows.results.collected import CollectedTrials
 MOST_LEFT_OUT = 10_000
 """A larger number in an edited file is no number of sessions."""
 Form = Literal["psych-ds", "bids", "mat", "csv"]
+"""Form of an export, as the command line takes it."""
 WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
     "psych-ds": write_psych_ds,
     "bids": write_bids,
     "mat": write_trials_mat,
     "csv": tidy_csv.write_tidy_csv,
 }
+"""What writes each form; returns the written files."""
 
 
 @dataclass(frozen=True, slots=True)

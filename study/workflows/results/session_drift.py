@@ -15,6 +15,7 @@ from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import SessionFolder
 
 LIMITS = ChangeLimits()
+"""The daily check's limits."""
 ALLOWED = {
     "friction": LIMITS.friction_n,
     "gain": LIMITS.share,
@@ -27,6 +28,7 @@ ALLOWED = {
 daily check; delay: one tick of the loop; hand: half of a light grip."""
 
 WITHOUT_HAND = ("friction", "gain", "delay")
+"""Quantities that references without a hand are compared by."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,11 +26,13 @@ from study.store.sessions.archive import SessionFolder
 from study.workflows.equalizer.spring_not_in_model import spring_outside_model
 
 MODEL_NAME = "model.h5"
+"""Copy of the model in the session's folder."""
 NEAR_M = 0.02
 """Largest distance (m) from the place of identification: farther away, coupling between the axes grows back to what was
 published without an equalizer."""
 
 AXES = (("fx", "fy", "fz"), ("ax", "ay", "az"))
+"""Channels that a model of a study needs: forces, then accelerations, in this order."""
 IDENTIFY_AGAIN = "Identify it again with hapteq identify."
 LARGEST_ERROR = 0.1
 """Largest relative error of a stimulus by the model itself; beyond it a level would not have its meaning."""
@@ -47,6 +49,7 @@ class Equalized:
 
 
 NOT_EQUALIZED = Equalized(Identity(), None)
+"""Of a study whose stimuli are forces."""
 
 
 def check_playable(protocol: StudyProtocol, model: Path | None) -> None:

@@ -17,11 +17,15 @@ from study.store.sessions.withdrawal_files import SessionParticipant, read_begun
 from study.workflows.trial.sitting import Sitting, record
 
 PLACED = b'"event":"place_taken"'
+"""In a line of a log: the event that gives the participant's number."""
 NUMBER = re.compile(rb'"participant_number":(\d{1,6})\b')
 """The number in a log: in its opening line, or in the event that replaces it; the last occurrence counts."""
 PROTOCOL_NAME = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
+"""Name of the protocol in the opening line, whose TOML text stands in it as a JSON string."""
 OF_A_PERSON = b'"observer":null'
+"""In the opening line of a person's session."""
 PRESENTED = b'"event":"trial_presented"'
+"""In a line of a log: the first of these ends the preparation."""
 
 
 def participant_number(data: Path, subject: str, protocol: str, simulated: bool) -> int:

@@ -30,6 +30,7 @@ LARGEST_BYTES = 1 << 24
 LONGEST_LINE = 1 << 20
 """Bytes of a log's first line that are read."""
 TEXTS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".part")
+"""File types that are searched for names of a participant's sessions."""
 
 
 @dataclass(frozen=True, slots=True)

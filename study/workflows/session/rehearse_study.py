@@ -27,6 +27,7 @@ from study.workflows.session.simulated_participant import create_participant
 from study.workflows.worker_processes import worker_processes
 
 DEVICE = "simulated"
+"""Device of every rehearsal."""
 
 
 @dataclass(frozen=True, slots=True)

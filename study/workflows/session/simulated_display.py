@@ -36,6 +36,7 @@ PATIENCE_S = 60.0
 """Longest wait for the handle: a simulated one is not moved by a person."""
 
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
+"""Reply where a sign of life ended the wait."""
 
 
 class SimulatedDisplay:
@@ -59,6 +60,7 @@ class SimulatedDisplay:
         self._stimulus: Present | None = None
 
     def feel(self, stimulus: Present, answers_before: int) -> None:
+        """Keeps the stimulus for the answer, and for the touch."""
         self._stimulus = stimulus
         self._felt = PerceivedStimulus(
             run=stimulus.run,
@@ -73,6 +75,7 @@ class SimulatedDisplay:
         )
 
     def fill_in(self, form: Form) -> FormReply:
+        """The first answer that each field allows, as a participant who takes part gives it."""
         return FormReply({field.key: _first_answer(field) for field in form.fields})
 
     def device_checked(self, report: DeviceReport) -> bool:
@@ -88,6 +91,7 @@ class SimulatedDisplay:
         return None if self._wait(notice.seconds, sign_of_life) else CUT_SHORT
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
+        """Gives up after `PATIENCE_S`."""
         until_s = self._clock.now_s() + PATIENCE_S
         while not look().ready:
             if self._clock.now_s() > until_s:
@@ -97,6 +101,7 @@ class SimulatedDisplay:
         return None
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
+        """The answer of the observer, after its response time. Raises RuntimeError where nothing was felt before."""
         if self._on_question is not None:
             self._on_question(question)
         if self._felt is None:

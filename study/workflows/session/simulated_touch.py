@@ -34,6 +34,7 @@ class SimulatedTouch:
         self._device, self._directions = device, fold_session(folder).state.protocol.directions
 
     def seconds(self, stimulus: Present) -> float:
+        """How long a stimulus is felt (s)."""
         return PERIODS / stimulus.frequency_hz
 
     def feel(self, stimulus: Present, sign_of_life: SignOfLife) -> Delivered | None:

@@ -65,7 +65,9 @@ class Display(Protocol):
         """Wait for the answer 1 or 2."""
         ...
 
-    def feedback(self, correct: bool) -> None: ...
+    def feedback(self, correct: bool) -> None:
+        """Show whether the answer was right. Only where the protocol gives feedback."""
+        ...
 
     def practice_over(self, result: PracticeResult) -> None:
         """Show a notice. Returns when the participant has read it."""
@@ -85,7 +87,9 @@ class Display(Protocol):
         """After a void trial: wait until the participant is ready."""
         ...
 
-    def goodbye(self, notice: Goodbye) -> None: ...
+    def goodbye(self, notice: Goodbye) -> None:
+        """Show the end of the sitting."""
+        ...
 
     def trouble(self, sentence: str) -> None:
         """Show a message that does not end the session."""
@@ -95,7 +99,10 @@ class Display(Protocol):
 class Hand(Protocol):
     """The hand on the handle. A person feels the device; a simulated hand is given the stimulus."""
 
-    def feel(self, stimulus: Present, answers_before: int) -> None: ...
+    def feel(self, stimulus: Present, answers_before: int) -> None:
+        """Told what is played: as soon as a stimulus is held; in a detection trial, before its first interval.
+        answers_before: answers of the session so far, training included."""
+        ...
 
 
 class PersonsHand:

@@ -26,8 +26,10 @@ LIGHTER_WITHOUT_A_HAND = 0.9
 """Largest ratio of the apparent mass after the hand let go to that just before, with the hand."""
 
 NO_QUESTION = "Nothing to answer: the device is measured"
+"""Shown while a probe or the reference plays."""
 
 Kind = Literal["hand", "free", "reference"]
+"""With the hand on the handle; test whether it is free; reference without a hand."""
 
 
 class _EndedEarlyError(Exception):

@@ -25,6 +25,7 @@ from study.workflows.trial.sitting import Pulse, Sitting, record, release_device
 from study.workflows.trial.trial_facts import Outcome, answer_health, trial_measured, trial_presented, trial_spoiled
 
 NOT_MASKED = Unanswered("the masking noise stopped during the trial", leave=False)
+"""Reply in place of an answer given without masking noise: the trial is void."""
 
 
 def question_of(state: SessionState, present: Present) -> Question:

@@ -21,6 +21,7 @@ class QueuedRequests:
         self._queue: SimpleQueue[Request] = SimpleQueue()
 
     def send(self, request: Request) -> None:
+        """Put a request into the queue. From any thread."""
         self._queue.put(request)
 
     def take(self) -> tuple[Request, ...]:
@@ -39,4 +40,5 @@ class ManyRequests:
         self._sources = sources
 
     def take(self) -> tuple[Request, ...]:
+        """In the order of the sources, not by age."""
         return tuple(request for source in self._sources for request in source.take())

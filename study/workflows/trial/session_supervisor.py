@@ -14,6 +14,7 @@ LIVE_EVERY_S = 0.25
 """Interval of the live state: often enough for a viewer, with little load on the disk."""
 
 PLAYING = ("trial", "demo", "probe", "reference")
+"""Activities in which the device holds a stimulus: a fault ends their wait."""
 
 
 class SessionSupervisor:
@@ -91,13 +92,16 @@ class SessionSupervisor:
         return reply
 
     def note(self, note: NoteAsked) -> None:
+        """Keep a note until `take_notes`; nothing is written yet."""
         self._notes.append(note)
 
     def take_notes(self) -> tuple[NoteAsked, ...]:
+        """Notes since the last call, oldest first."""
         notes, self._notes = tuple(self._notes), []
         return notes
 
     def handle_is(self, ready: bool) -> None:
+        """Whether the handle is at its place: shown to viewers, until the next `begin`."""
         self._handle_ready = ready
 
     def _report(self) -> None:

@@ -23,26 +23,40 @@ class Pulse(Protocol):
     """Electrical pulse at the onset of a stimulus: the port that `study.devices.onset_line` provides."""
 
     @property
-    def line(self) -> str: ...
+    def line(self) -> str:
+        """Which line, in words."""
+        ...
 
     @property
-    def at_s(self) -> float | None: ...
+    def at_s(self) -> float | None:
+        """When the pulse began, by the monotonic clock (s); None where it was lost."""
+        ...
 
     @property
-    def trouble(self) -> str: ...
+    def trouble(self) -> str:
+        """Why it was lost; empty where it was not."""
+        ...
 
 
 class Sound(Protocol):
     """Masking noise, as `study.devices.masking_sound` plays it. `start` and `check` raise `DeviceError`."""
 
     @property
-    def output(self) -> str: ...
+    def output(self) -> str:
+        """Name of the sound output."""
+        ...
 
-    def start(self) -> None: ...
+    def start(self) -> None:
+        """Play from the beginning, until `stop`."""
+        ...
 
-    def check(self) -> None: ...
+    def check(self) -> None:
+        """Raises where the noise is not heard."""
+        ...
 
-    def stop(self) -> bool: ...
+    def stop(self) -> bool:
+        """Stop the noise. Whether it was heard until then."""
+        ...
 
 
 def no_pulse() -> None:

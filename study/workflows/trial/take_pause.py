@@ -19,6 +19,7 @@ class PauseOutcome:
 
 
 LEAVE = {AfterPause.LEAVE: "the participant left", AfterPause.WITHDRAW: "the participant withdrew"}
+"""Why a sitting ends after a pause, by the participant's decision."""
 
 
 def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutcome:

@@ -42,9 +42,11 @@ class MarkerOutlet:
         self._outlet = self._library.StreamOutlet(self._library.StreamInfo(*described))
 
     def clock_s(self) -> float:
+        """Time by LSL's clock (s)."""
         return float(self._library.local_clock())
 
     def push(self, marker: str, at_s: float) -> None:
+        """Send a marker with its time by LSL's clock (s)."""
         self._outlet.push_sample([marker], at_s)
 
     def signal_outlet(self, stream: StreamDescription, rate_hz: float) -> SignalOutlet:

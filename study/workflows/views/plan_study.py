@@ -20,7 +20,9 @@ from study.workflows.session.participant_number import participant_number, read_
 from study.workflows.views.session_line import session_line
 
 PROGRESS: dict[str, Progress] = {"finished": "done", "unfinished": "begun", "running": "begun"}
+"""Progress of a participant, by the standing of the best session; any other standing leaves out."""
 BEST_FIRST = ("finished", "running", "unfinished")
+"""Standings by which the best session of a participant is chosen."""
 
 
 @dataclass(frozen=True, slots=True)

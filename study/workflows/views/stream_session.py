@@ -62,6 +62,7 @@ class SideTasks:
 
 
 NOTHING_BESIDE = SideTasks(lambda offset_s: None, lambda offset_s: 0)
+"""No other tasks: no ticks are sent, and none lost."""
 
 
 class LogFollower:

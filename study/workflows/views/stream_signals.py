@@ -30,6 +30,7 @@ STREAMS = (
     StreamDescription("hapteq motion", "Motion", (*_three("position"), *_three("velocity")), ("m",) * 3 + ("m/s",) * 3),
     StreamDescription("hapteq loop", "Status", ("tick", "phase", "fault", "missed_ticks"), ("",) * 4),
 )
+"""The streams, in the order of the signals that are sent; in each, the channels and their units."""
 
 
 class SignalStreams:

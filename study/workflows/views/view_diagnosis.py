@@ -20,7 +20,9 @@ from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
 MISMATCH_HEADER = ("output", "input", "band", "amplitude", "where", "share", "p")
+"""Columns of the table of mismatches."""
 FIT_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allow")
+"""Columns of the table of held-out errors."""
 
 
 def diagnosis_view(path: Path) -> DiagnosisView:

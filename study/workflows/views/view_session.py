@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from analysis.psychophysics.study_analysis import StudyAnalysis
 
 THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "trials", "right", "remark")
+"""Columns of the table of thresholds."""
 
 
 def session_view(path: Path, zone: Zone = in_utc) -> SessionView:

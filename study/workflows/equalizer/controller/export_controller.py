@@ -20,11 +20,13 @@ from study.workflows.equalizer.controller.c_text import CHECK, EXAMPLE, HEADER, 
 from study.workflows.free_name import require_free
 
 TITLE = "The controller was not exported"
+"""Title of each error of this command."""
 LONGEST_ROWS = 5000
 """Longest transient in rows: every row is 130 numbers for a model of order 26, and a compiler reads them all."""
 LONGEST_PREVIEW_S = 2.0
 """Longest preview that is accepted (s)."""
 TRY = "Such as --preview 200 --cap 3."
+"""Settings that fit in most cases, for messages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,7 @@ class ExportedController:
 
     @property
     def files(self) -> tuple[Path, ...]:
+        """Paths of the header, the example and the check."""
         return tuple(self.plan.out / name for name in (HEADER, EXAMPLE, CHECK))
 
 
