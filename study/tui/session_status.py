@@ -11,6 +11,7 @@ SYMBOLS: dict[Standing, str] = {
     "withdrawn": "✕",
     "unreadable": "!",
 }
+"""A character for each standing."""
 
 STYLES: dict[Standing, str] = {
     "finished": "$text-success",
@@ -21,6 +22,7 @@ STYLES: dict[Standing, str] = {
     "withdrawn": "$foreground 65%",
     "unreadable": "$text-error",
 }
+"""Style of the symbol and its word."""
 
 
 def status_text(standing: Standing) -> str:

@@ -5,6 +5,7 @@ from textwrap import wrap
 Rows = tuple[tuple[str, ...], ...]
 
 GAP = "  "
+"""Between two columns."""
 LEAST_CELLS = 12
 """Smallest width to which a column is narrowed; longer lines are wrapped by the terminal."""
 

@@ -22,6 +22,7 @@ DARK = Theme(
     panel="#262C32",
     dark=True,
 )
+"""Theme of the applications at their start."""
 
 LIGHT = Theme(
     name="hapteq-light",
@@ -54,6 +55,7 @@ CONTRAST = Theme(
 )
 
 THEMES = (DARK, LIGHT, CONTRAST)
+"""All themes."""
 NEXT = {"hapteq-dark": "hapteq-light", "hapteq-light": "hapteq-contrast", "hapteq-contrast": "hapteq-dark"}
 """The theme after each one, for a key that cycles through them."""
 

@@ -23,6 +23,7 @@ class TranslatedScreen(Screen[Reply]):
 
     @property
     def HELP(self) -> str:  # type: ignore[override]  # noqa: N802  a class attribute elsewhere
+        """Text of the help (Markdown): the entry `PAGE` of the words."""
         return self.words[self.PAGE]
 
     @property

@@ -23,6 +23,7 @@ RELOAD_S = 10.0
 """Longest wait of a reloaded page for the sitting of the old one to end."""
 
 THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")
+"""Names of this machine in an address, each of which a browser may use for the page."""
 TOKEN_BYTES = 32
 """Random bytes in the address: it cannot be guessed."""
 

@@ -35,7 +35,9 @@ from study.tui.watch.watch_in_app import Watching
 
 
 class HapteqApp(App[None]):
-    """The application of `hapteq study`: draws screens, reads keys, and lets the engine do all other work."""
+    """The application of `hapteq study`: draws screens, reads keys, and lets the engine do all other work. On every
+    screen F1 shows its help, F9 changes the colours, Ctrl-C takes the force off, Ctrl-Q leaves; in a sitting F2 shows
+    the experimenter's view, F4 takes a note (with Shift: an adverse event), F7 pauses."""
 
     TITLE = "hapteq"
     # At the top: the keys and what to press next stand at the bottom.
@@ -88,6 +90,7 @@ class HapteqApp(App[None]):
 
     @property
     def engine_pid(self) -> int | None:
+        """Number of the engine's process; None before it has started."""
         return self._engine.pid
 
     def close_engine(self) -> None:

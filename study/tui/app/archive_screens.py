@@ -109,6 +109,7 @@ class ArchiveScreens:
             self._app.pop_screen()
 
     async def hear(self, message: FromEngine) -> None:
+        """Show what a message of the engine brings. Only outside sittings."""
         match message:
             case Home(view=view) if self._home is not None:
                 self._home.show(view)

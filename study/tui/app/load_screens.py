@@ -14,6 +14,7 @@ NEEDED_LATER = (
     "study.tui.watch.watch_screen",
     "study.tui.engine.watch_feed",
 )
+"""Modules that no first frame needs."""
 
 
 def load_screens() -> None:

@@ -52,6 +52,7 @@ SCREENS: dict[Call, Callable[[Any, Words], Screen[Any]]] = {
     Call.AWAIT_RETURN: AwaitReturnScreen,
     Call.GOODBYE: GoodbyeScreen,
 }
+"""Screen of each request of the engine; those that are missing here take more than what is shown."""
 
 
 def screen_for(ask: Ask, keys: AnswerKeys, words: Words) -> Screen[Any]:

@@ -8,6 +8,7 @@ _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 """Bit of the dot in row r, column c of a cell, in Unicode's order."""
 
 Point = tuple[float, float]
+"""x and y in dots, from the centre of the upper left dot."""
 
 
 @dataclass(slots=True)
@@ -23,14 +24,17 @@ class Canvas:
 
     @property
     def width(self) -> int:
+        """Dots in a row."""
         return 2 * self.columns
 
     @property
     def height(self) -> int:
+        """Rows of dots."""
         return 4 * self.rows
 
     @property
     def middle(self) -> Point:
+        """Centre of the canvas; it lies between dots."""
         return (self.width - 1) / 2, (self.height - 1) / 2
 
     def dot(self, x: int, y: int) -> None:
@@ -39,6 +43,7 @@ class Canvas:
             self._cells[(y // 4) * self.columns + x // 2] |= _DOTS[y % 4][x % 2]
 
     def line(self, start: Point, end: Point, dashed: bool = False) -> None:
+        """A line of one dot's width, both ends included. dashed: five dots of each eight."""
         steps = max(1, round(max(abs(end[0] - start[0]), abs(end[1] - start[1]))))
         for i in range(steps + 1):
             if dashed and i % 8 >= 5:
@@ -63,12 +68,14 @@ class Canvas:
         )
 
     def circle(self, centre: Point, radius: float) -> None:
+        """A circle of one dot's width."""
         steps = max(8, math.ceil(2 * math.pi * radius))
         for i in range(steps):
             turn = 2 * math.pi * i / steps
             self.dot(round(centre[0] + radius * math.cos(turn)), round(centre[1] + radius * math.sin(turn)))
 
     def disc(self, centre: Point, radius: float) -> None:
+        """A filled circle, as a polygon of 24 corners."""
         turns = [2 * math.pi * i / 24 for i in range(24)]
         self.fill([(centre[0] + radius * math.cos(turn), centre[1] + radius * math.sin(turn)) for turn in turns])
 
@@ -83,6 +90,7 @@ class Canvas:
                 self.dot(x, y)
 
     def lines(self) -> list[str]:
+        """The canvas as lines of `columns` characters, `rows` of them; cells without a dot are blanks."""
         cells = ["".join(chr(0x2800 + c) for c in self._row(r)) for r in range(self.rows)]
         return [row.replace("\u2800", " ") for row in cells]
 

@@ -8,6 +8,7 @@ from study.tui.drawing.braille import Canvas
 
 RIGHT, WRONG, PEAK, VALLEY = "○", "×", "▼", "▲"
 LEGEND = f"{RIGHT} right  {WRONG} wrong  {PEAK} peak  {VALLEY} valley  ┄ cap  ··· threshold"
+"""Meaning of the marks, in one line."""
 
 LABEL_COLUMNS = 8
 """Columns of the axis's labels, the space behind them included."""

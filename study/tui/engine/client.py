@@ -42,6 +42,7 @@ class EngineClient:
 
     @property
     def pid(self) -> int | None:
+        """Number of the engine's process; None before it has started."""
         return self._process.pid if self._process is not None else None
 
     def start(self) -> None:

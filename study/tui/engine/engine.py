@@ -36,6 +36,7 @@ LAST_RESORT_S = 5.0
 INTERRUPTED = StudyError(
     "Interrupted", "No force is on.", "Begin again, or leave.", "Every answer that was given is on disk."
 )
+"""Error of a command that the user let go of."""
 
 
 class Engine:

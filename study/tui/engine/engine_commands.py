@@ -67,6 +67,7 @@ REPLY_S = 0.5
 """A wait for a reply, which an interruption ends in between."""
 
 CALIBRATION_STOPPED = StudyError("The calibration was stopped", "", "Begin it again.", "Nothing was written.")
+"""Error of a calibration that the user stopped."""
 
 
 class EngineCommands:

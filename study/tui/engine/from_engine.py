@@ -212,3 +212,4 @@ FromEngine = (
     | Withdrawn
     | Failed
 )  # fmt: skip
+"""Any message from the engine."""

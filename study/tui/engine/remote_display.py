@@ -41,7 +41,9 @@ SILENT_AFTER_S = 0.5
 """A screen without heartbeat for this long is suspended, dead or hung: a stimulus could not be stopped."""
 
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
+"""Reply where a sign of life ended the wait."""
 TOO_LATE = Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
+"""Reply after the question's time limit."""
 
 
 class RemoteDisplay:

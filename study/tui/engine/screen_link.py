@@ -32,6 +32,7 @@ class ScreenLink:
         self._heard_s = time.monotonic()
 
     def start(self) -> None:
+        """Listen to the screen in a thread, until it is gone."""
         threading.Thread(target=self._listen, name="screen-link", daemon=True).start()
 
     def send(self, message: FromEngine) -> None:
@@ -51,6 +52,7 @@ class ScreenLink:
 
     @property
     def command_waits(self) -> bool:
+        """Whether a command has come that was not taken yet."""
         return not self._commands.empty()
 
     @property

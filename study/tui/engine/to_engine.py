@@ -155,3 +155,4 @@ Command = (
 """Commands that the engine performs one after another."""
 
 ToEngine = Command | Relay | LetGo | Heartbeat | Reply
+"""Any message from the screen."""

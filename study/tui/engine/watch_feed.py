@@ -35,9 +35,11 @@ class WatchFeed:
 
     @property
     def child_pid(self) -> int:
+        """Number of the process that reads the log."""
         return self._child.pid
 
     def close(self) -> None:
+        """End the child, and kill it where it does not end within `CLOSING_S`. May be called again."""
         if self._closing:
             return
         self._closing = True

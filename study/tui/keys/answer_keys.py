@@ -31,6 +31,7 @@ class AnswerKeys:
 
 
 DIGITS = AnswerKeys()
+"""The digits alone."""
 
 
 def parse_keys(text: str) -> AnswerKeys:

@@ -26,6 +26,7 @@ class Line:
 
     @property
     def word(self) -> str:
+        """The text without regard to case, to compare with words."""
         return self.text.casefold()
 
 
@@ -48,6 +49,7 @@ class Conversation:
         self.words = words
 
     def say(self, *sentences: str) -> None:
+        """Write each sentence on a line of its own, wrapped at `LINE_WIDTH` between words."""
         for text in sentences:
             # A drawing's lines are short enough; sentences break between words.
             lines = textwrap.wrap(text, LINE_WIDTH) if len(text) > LINE_WIDTH else [text]
@@ -63,6 +65,7 @@ class Conversation:
         self.say(self.words.fill(key, {"typed": shown(line, self.words)}))
 
     def prompt(self, text: str) -> None:
+        """Write a text without a line end: the answer is typed behind it."""
         self._out.write(text)
         self._out.flush()
 

@@ -15,6 +15,8 @@ class LineInput:
         self.interactive = os.isatty(self._descriptor)
 
     def read(self, timeout_s: float) -> str | None:
+        """The next line without its end; None if there is none within timeout_s. Raises EOFError at the end of the
+        input."""
         line = self._take_line()
         if line is not None:
             return line

@@ -16,7 +16,9 @@ SAY_AGAIN_S = 1.0
 """A screen reader that hears more than a sentence a second never finishes one."""
 
 CUT_SHORT = Unanswered(WaitOver.CUT_SHORT.value, leave=False)
+"""Reply where a sign of life ended the wait."""
 INPUT_ENDED = Unanswered(WaitOver.INPUT_ENDED.value, leave=True)
+"""Reply at the end of the input."""
 
 
 def choose_demo(menu: DemoMenu, talk: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> DemoChoice:

@@ -8,6 +8,7 @@ from study.tui.line_mode.conversation import Conversation, Line, printable, show
 from study.tui.trial_words import limits_words, origin
 
 BACK = "b"
+"""Word that goes back to the question before, in every language."""
 
 
 def fill_in(form: Form, talk: Conversation) -> FormReply:

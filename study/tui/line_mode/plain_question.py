@@ -20,6 +20,7 @@ from study.tui.trial_words import heading, plan
 from study.workflows.trial.display import SignOfLife
 
 LEFT = Unanswered("the participant left", leave=True)
+"""Reply of a participant who types q."""
 
 
 def keys_sentence(keys: AnswerKeys, words: Words) -> str:

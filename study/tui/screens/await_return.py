@@ -15,7 +15,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class AwaitReturnScreen(TranslatedScreen[None]):
-    """Waits for Enter after a void trial; nothing is played meanwhile."""
+    """Says why the trial is void and that nothing is lost, and waits for Enter; nothing is played meanwhile."""
 
     PAGE = "help_void"
     DEFAULT_CSS = "AwaitReturnScreen { align: center middle; }"

@@ -26,10 +26,11 @@ back.
 
 In a terminal: `hapteq show PATH`.
 """
+"""Help of the screen, in Markdown."""
 
 
 class HapteqFiles(DirectoryTree):
-    """Folders, and the two kinds of file that can be opened."""
+    """Folders, event logs of sessions and documents of diagnoses; other files are not listed."""
 
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
         return [path for path in paths if not path.name.startswith(".") and (_is_ours(path) or path.is_dir())]
@@ -40,7 +41,8 @@ def _is_ours(path: Path) -> bool:
 
 
 class BrowseScreen(ModalScreen[None]):
-    """A tree of folders, in which a session or a diagnosis is picked."""
+    """A tree of folders and a field for a path, by which a session or a diagnosis is opened: Enter opens, Esc goes
+    back."""
 
     HELP = HELP
     CSS = """

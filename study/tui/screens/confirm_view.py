@@ -21,7 +21,8 @@ SHOWN_HERE = "The participant's screen showed the experimenter's view: levels, a
 
 
 class ConfirmView(ModalScreen[bool]):
-    """Returns True if the session's name was typed."""
+    """Asks for the session's name before levels and answers are shown: Enter judges what was typed, Esc goes back.
+    Returns True if it was the name."""
 
     HELP = """\
 # The experimenter's view

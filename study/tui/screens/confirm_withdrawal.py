@@ -16,7 +16,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class ConfirmWithdrawal(TranslatedScreen[bool], ModalScreen[bool]):
-    """Returns True if the word was typed."""
+    """Asks a participant for a word before all data are erased: Enter judges what was typed, Esc keeps everything.
+    Returns True if it was the word."""
 
     PAGE = "help_withdraw"
     DEFAULT_CSS = """

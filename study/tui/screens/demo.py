@@ -20,7 +20,9 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class DemoScreen(TranslatedScreen[DemoChoice]):
-    """Plays either direction at each vibration on request; dismissed with the choice."""
+    """Both directions with the vibration that is chosen, and which ones were felt. 1 and 2 (and further answer keys)
+    play a direction, the arrow keys, b and n choose a slower or faster vibration, p pauses, Enter ends. Dismissed with
+    the choice."""
 
     PAGE = "help_demo"
     DEFAULT_CSS = """
@@ -41,7 +43,7 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
     ]
 
     class PauseWanted(Message):
-        """The demonstration's reply has no word for it."""
+        """p was pressed; a choice of the demonstration cannot say it."""
 
     def __init__(self, menu: DemoMenu, keys: AnswerKeys = DIGITS, words: Words = ENGLISH_WORDS) -> None:
         super().__init__(words)

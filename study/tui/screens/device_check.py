@@ -15,7 +15,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class DeviceCheckScreen(TranslatedScreen[bool]):
-    """True: go on. False: check again."""
+    """The findings about the device with advice, and a conclusion. Enter goes on where it can be used, g all the same
+    where it cannot, c checks again. True: go on. False: check again."""
 
     PAGE = "help_check"
     DEFAULT_CSS = """

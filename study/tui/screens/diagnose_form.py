@@ -32,16 +32,19 @@ Where does a recording differ from a model of the device, and what physics does 
 
 In a terminal: `hapteq diagnose REC.h5 --model MODEL.toml --out DIR`.
 """
+"""Help of the screen, in Markdown."""
 FIELDS = (
     ("sources", "Recordings", "REC.h5, several, or a session's folder"),
     ("model", "Model", "MODEL.toml; empty: none is given"),
     ("clean", "In order", "recordings of it when nothing was missing; may stay empty"),
     ("out", "Results", "a new folder; empty: beside the recording"),
 )
+"""Key, title and hint of each field."""
 
 
 class DiagnoseForm(ModalScreen[None]):
-    """Asks for recordings and model of a diagnosis, and checks the paths."""
+    """Asks for recordings, model, clean recordings and folder of a diagnosis. F5 or Enter checks the paths and posts
+    the request, Esc goes back."""
 
     HELP = HELP
     CSS = """

@@ -21,10 +21,11 @@ suggest is fitted, and compared with its rivals on data that no fit has seen.
 
 **Esc** stops it. Nothing is written before the end, so nothing half done is left.
 """
+"""Help of the screen, in Markdown."""
 
 
 class DiagnosingScreen(Screen[bool]):
-    """Returns True if it was stopped."""
+    """Current step, progress and elapsed time of a diagnosis; Esc stops it. Returns True if it was stopped."""
 
     HELP = HELP
     CSS = """
@@ -57,6 +58,7 @@ class DiagnosingScreen(Screen[bool]):
         self.set_interval(TICK_S, self._tick)
 
     def show(self, what: str, share: float) -> None:
+        """what: the current step as a sentence without capital and full stop; share: done, 0 to 1."""
         if self.query("#what"):
             self.query_one("#what", Static).update(f"{what[:1].upper()}{what[1:]}.")
             self.query_one(ProgressBar).update(progress=share)

@@ -33,10 +33,12 @@ Arrow keys, PageUp and PageDown scroll. **o** opens the report in the browser. *
 
 In a terminal: `hapteq show diagnosis.json`.
 """
+"""Help of the screen, in Markdown."""
 
 
 class DiagnosisScreen(Screen[None]):
-    """A finished diagnosis on one page, in two columns where the terminal is wide."""
+    """A finished diagnosis on one page, in two columns where the terminal is wide: verdict, effects, candidates,
+    rivals, next recording; errors and mismatches as tables. o opens the report, Esc goes back."""
 
     HELP = HELP
     CSS = """

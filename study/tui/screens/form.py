@@ -45,11 +45,12 @@ KEYS = (
 )
 """Footer entries: key, where it has this meaning (empty: everywhere), how it is shown, meaning."""
 FOOTER_KEYS = frozenset(key for key, *_ in KEYS)
+"""All keys of the footer."""
 
 
 class FormScreen(TranslatedScreen[FormReply]):
-    """Shows a `FormEntry`. No widget in it has the focus: keys, clicks and pastes come to the screen in order, and
-    each is applied to the entry before the next."""
+    """Shows a `FormEntry`: introduction, questions, and a button to go on; the keys are in `KEYS`. No widget in it has
+    the focus: keys, clicks and pastes come to the screen in order, and each is applied to the entry before the next."""
 
     PAGE = "help_form"
     DEFAULT_CSS = """
@@ -99,6 +100,7 @@ class FormScreen(TranslatedScreen[FormReply]):
 
     @property
     def entry(self) -> FormEntry:
+        """What was entered so far, and where the cursor is."""
         return self._entry
 
     @property

@@ -16,7 +16,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class GoodbyeScreen(TranslatedScreen[None]):
-    """Thanks the participant and says what was saved."""
+    """Thanks the participant, says how the sitting ended and how many answers are saved; Enter closes it."""
 
     PAGE = "help_goodbye"
     DEFAULT_CSS = "GoodbyeScreen { align: center middle; }"

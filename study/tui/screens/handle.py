@@ -16,7 +16,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class HandleScreen(TranslatedScreen[Unanswered | None]):
-    """The application closes it when the handle is there."""
+    """Where the handle is and where it belongs; p pauses, q leaves. The application closes it when the handle is
+    there."""
 
     PAGE = "help_handle"
     DEFAULT_CSS = """
@@ -44,6 +45,7 @@ class HandleScreen(TranslatedScreen[Unanswered | None]):
         self.update_view(self._view)
 
     def update_view(self, view: HandleView) -> None:
+        """Draw the handle's present position. Also before the first frame."""
         self._view = view
         if self.query(HandleTarget):  # not yet, where it comes before the first frame
             self.query_one(HandleTarget).view = view

@@ -14,7 +14,7 @@ from study.tui.translated_screen import TranslatedScreen
 
 
 class HelpScreen(TranslatedScreen[None], ModalScreen[None]):
-    """Shows a page of help; Esc returns to the screen below."""
+    """Shows a page of help (Markdown); Esc, F1, q or ? returns to the screen below."""
 
     CSS = """
     HelpScreen { align: center middle; }

@@ -19,6 +19,7 @@ from study.tui.widgets.new_session_form import NewSessionForm
 from study.tui.widgets.session_table import SessionTable
 
 LOOKING = "Looking for sessions…"
+"""Shown until the list of sessions is there."""
 
 EMPTY = """\
 No sessions here yet. To begin with:
@@ -34,6 +35,7 @@ No sessions here yet. To begin with:
 
 F1 explains this screen.\
 """
+"""Shown in place of an empty list."""
 
 GUIDE = """\
 [b]A study day[/b]
@@ -53,6 +55,7 @@ GUIDE = """\
 ✕  withdrawn: the data were erased
 !  unreadable: Enter says why
 """
+"""Shown below the form where the terminal is wide."""
 
 HELP = """\
 # The start
@@ -81,10 +84,12 @@ accelerations asks for a model of the device too: one that lies with the data (`
 
 In a terminal: `hapteq study --subject P01`, `hapteq sessions`, `hapteq show SESSION`, `hapteq resume SESSION`.
 """
+"""Help of the screen, in Markdown."""
 
 
 class HomeScreen(Screen[None]):
-    """New-session form and list of past sessions; their actions are posted as messages."""
+    """New-session form and list of past sessions. F2 and F3 go to form and list, F4 opens a file, F6 reads the list
+    anew, F7 calibrates the accelerometer, F8 diagnoses recordings. Actions are posted as messages."""
 
     HELP = HELP
     CSS = """

@@ -19,7 +19,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class InstructionsScreen(TranslatedScreen[None]):
-    """Instructions before the first trial; dismissed when the participant begins."""
+    """Instructions before the first trial: how to hold the handle, the two directions, how to answer, the plan of the
+    sitting. Enter begins."""
 
     PAGE = "help_instructions"
     DEFAULT_CSS = """

@@ -20,10 +20,12 @@ from study.tui.widgets.literal_text import LiteralText
 MOST_CHARACTERS = 500
 """Longest note: a few sentences, so that a line of the log stays readable."""
 WRITERS: tuple[Who, ...] = ("participant", "experimenter")
+"""Writers to choose from, in this order."""
 
 
 class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
-    """A text, its writer, and whether it reports an adverse event. Dismissed with None if nothing is to be written."""
+    """Fields for a text, its writer, and whether it reports an adverse event. Ctrl-S or the button writes it, Esc
+    leaves. Dismissed with None if nothing is to be written."""
 
     PAGE = "help_note"
     DEFAULT_CSS = """

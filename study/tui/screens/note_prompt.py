@@ -16,7 +16,8 @@ MOST_CHARACTERS = 500
 
 
 class NotePrompt(ModalScreen[str | None]):
-    """Returns the text; None if nothing is to be noted."""
+    """A line for a note of the experimenter: Enter writes it, Esc leaves, F8 stops the session. Returns the text; None
+    if nothing is to be noted."""
 
     CSS = """
     NotePrompt { align: center bottom; }

@@ -17,6 +17,7 @@ from study.tui.dismiss_screen import dismiss_screen
 from study.tui.translated_screen import TranslatedScreen
 
 Decision = Literal["resume", "look", "home", "quit", "back"]
+"""Next step after a sitting or an error."""
 
 HELP = """\
 # How it ended
@@ -26,6 +27,7 @@ The box says what happened, what is safe on the disk, and what to do now. The ke
 Answers are written to the disk the moment they are given. A trial that was cut short comes again when the session
 is resumed. In a terminal: `hapteq resume SESSION`.
 """
+"""Help of the panel, in Markdown."""
 
 KEYS: dict[Decision, tuple[str, str]] = {
     "resume": ("r", "Resume the session"),
@@ -34,6 +36,7 @@ KEYS: dict[Decision, tuple[str, str]] = {
     "quit": ("q", "Leave hapteq"),
     "back": ("enter", "Back"),
 }
+"""Key of each next step, and its words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +55,8 @@ class Outcome:
 
 
 class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
-    """The panel; dismissed with the next step that was chosen."""
+    """Says what happened, what is saved and what to do; r, h, q and Enter choose the next step, as far as each is
+    offered. Dismissed with that step."""
 
     HELP = HELP
     CSS = """

@@ -25,10 +25,13 @@ CHOICES = {
     AfterPause.LEAVE: "pause_leave",
     AfterPause.WITHDRAW: "pause_withdraw",
 }
+"""Text of each decision, by its key in the words."""
 
 
 class PauseScreen(TranslatedScreen[AfterPause]):
-    """leaving: the participant asked to leave, so that choice is highlighted."""
+    """Why there is a pause and how many answers are saved. The arrow keys and Enter choose: go on, leave, or withdraw;
+    n and e write a note and an adverse event. leaving: the participant asked to leave, so that choice is
+    highlighted."""
 
     PAGE = "help_pause"
     DEFAULT_CSS = """
@@ -46,6 +49,8 @@ class PauseScreen(TranslatedScreen[AfterPause]):
 
     @dataclass
     class NoteWritten(Message):
+        """A note for the log."""
+
         note: NoteAsked
 
     def __init__(self, notice: PauseNotice, leaving: bool = False, words: Words = ENGLISH_WORDS) -> None:

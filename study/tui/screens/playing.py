@@ -17,7 +17,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class PlayingScreen(TranslatedScreen[Unanswered | None]):
-    """The application closes it when the time is over."""
+    """Which interval plays, or that a probe does; p pauses, q leaves. The application closes it when the time is
+    over."""
 
     PAGE = "help_playing"
     DEFAULT_CSS = """

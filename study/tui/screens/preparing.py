@@ -13,10 +13,12 @@ from study.tui.translated_screen import TranslatedScreen
 TICK_S = 0.5
 """Interval at which the elapsed time is drawn (s)."""
 SILENT = "…"
+"""Shown in place of a sentence."""
 
 
 class PreparingScreen(TranslatedScreen[None]):
-    """Without a sentence it says nothing: until the protocol was read, the participant's language is not known."""
+    """The current step of a preparation and the elapsed time; no keys. Without a sentence it says nothing: until the
+    protocol was read, the participant's language is not known."""
 
     PAGE = "help_preparing"
     CSS = """

@@ -21,7 +21,8 @@ TICK_S = 0.2
 
 
 class RestScreen(TranslatedScreen[float]):
-    """Returns the seconds rested, never fewer than requested."""
+    """Counts the enforced rest down and says how many runs are left; Enter goes on once it is over. Returns the seconds
+    rested, never fewer than requested."""
 
     PAGE = "help_rest"
     DEFAULT_CSS = """

@@ -29,7 +29,9 @@ A position that does not fit the others is named at the end: begin again with F5
 
 In a terminal: `hapteq doctor --calibrate-sensor PORT --keep`.
 """
+"""Help of the screen, in Markdown."""
 FIELDS = (("port", "Port", "/dev/ttyACM0"), ("baud", "Baud", "2000000"))
+"""Key, title and hint of each field."""
 BAUD = 2_000_000
 """Default rate of the serial line."""
 STEPS = 6
@@ -37,7 +39,8 @@ STEPS = 6
 
 
 class SensorScreen(Screen[None]):
-    """Guides through the six positions of the calibration; the engine reads the sensor."""
+    """Guides through the six positions of the calibration; the engine reads the sensor. F5 begins, Enter says that the
+    sensor lies as asked and, at the end, writes the result into the lab's file; Esc stops or goes back."""
 
     HELP = HELP
     CSS = """
@@ -78,6 +81,7 @@ class SensorScreen(Screen[None]):
         self.query_one("#port", Input).focus()
 
     def hear(self, message: LayDown | Calibrated | SensorKept) -> None:
+        """Show the next position, the result, or that it was written."""
         match message:
             case LayDown(number=number, position=position, heard=heard):
                 self._waits_for = message

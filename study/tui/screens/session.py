@@ -23,6 +23,7 @@ from study.tui.widgets.staircase_plot import StaircasePlot
 from study.tui.widgets.text_table import TextTable
 
 TABS = ("overview", "thresholds", "staircases", "log", "report")
+"""Pages, in the order of the keys 1 to 5."""
 
 HELP = """\
 # A session
@@ -42,10 +43,12 @@ after you typed the code. **Esc** goes back.
 
 In a terminal: `hapteq show SESSION`, `hapteq resume SESSION`, `hapteq analyze SESSION`, `hapteq withdraw SESSION`.
 """
+"""Help of the screen, in Markdown."""
 
 
 class SessionScreen(Screen[None]):
-    """One past session in tabs, with its actions: resume, analyse, withdraw, watch."""
+    """One past session on five pages, which the keys 1 to 5 choose. r resumes it, w watches, a analyses, d diagnoses, x
+    withdraws the participant, o opens the report, Esc goes back; each only where the session allows it."""
 
     HELP = HELP
     CSS = """

@@ -24,12 +24,15 @@ from study.tui.widgets.literal_text import LiteralText
 from study.tui.widgets.session_bar import SessionBar
 
 ASKED = {Task.DIRECTION: "asked_direction", Task.INTERVAL: "asked_interval"}
+"""Key of the question's text, by the task."""
 REPLIES = {"pause": PAUSE, "leave": LEAVING, "repeat": REPEAT}
+"""Replies by the name in the binding."""
 AFTER = {
     PAUSE: "pause_let_go",
     LEAVING: "pause_let_go",
     TIME_OVER: "time_over",
 }
+"""Key of the text that is shown after a reply; after REPEAT the number of repeats left is shown."""
 WANTED_FOR_S = 3.0
 """A pause asked for between two trials begins with the next one within this time."""
 NUM_LOCK = {"end", "down", "kp_begin"}
@@ -37,7 +40,8 @@ NUM_LOCK = {"end", "down", "kp_begin"}
 
 
 class TrialScreen(TranslatedScreen[None]):
-    """One per sitting: armed for each question, inactive in between."""
+    """The question, both answers, and how far the session is. 1 and 2 (and further answer keys) answer, p pauses, r
+    asks for the trial again, q leaves. One per sitting: armed for each question, inactive in between."""
 
     PAGE = "help_trial"
     DEFAULT_CSS = """
@@ -58,7 +62,7 @@ class TrialScreen(TranslatedScreen[None]):
 
     @dataclass
     class Replied(Message):
-        """Posted once for each arming."""
+        """The reply of the participant. Posted once for each arming."""
 
         reply: Reply
 

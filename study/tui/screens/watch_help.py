@@ -1,6 +1,7 @@
 """Help texts of the experimenter's view."""
 
 GUIDE = "You only watch: S stops, p pauses, n notes. Directions show after the answer."
+"""Shown in the experimenter's view, in one line."""
 
 HELP = """\
 # Watching a session
@@ -26,3 +27,4 @@ what the handle did along the direction, *off* across it. ↺ marks a reversal, 
 
 The direction of a trial stays hidden until its answer is in, so that you cannot give it away.
 """
+"""Help of the experimenter's view, in Markdown."""

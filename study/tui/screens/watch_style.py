@@ -24,3 +24,4 @@ WatchScreen.-wide #right { width: 34; }
 WatchScreen.-wide #trials { height: 14; }
 WatchScreen.-wide.details #aside { display: none; }
 """
+"""Layout and colours of the experimenter's view, in Textual's CSS."""

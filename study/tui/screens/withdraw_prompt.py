@@ -23,10 +23,12 @@ Type the code and press Enter to erase. **Esc** leaves everything as it is.
 
 In a terminal: `hapteq withdraw SESSION`.
 """
+"""Help of the prompt, in Markdown."""
 
 
 class WithdrawPrompt(ModalScreen[bool]):
-    """Returns True if the code was typed."""
+    """Asks for the participant's code before all sessions of it are erased: Enter judges what was typed, Esc keeps
+    everything. Returns True if it was the code."""
 
     HELP = HELP
     CSS = """

@@ -17,16 +17,21 @@ DOTS_PER_TRIAL = 4.0
 """Upper limit; many trials are drawn closer together."""
 
 MUTED = "$foreground 65%"
+"""Style of labels and legend."""
 NEXT = "?"
+"""Mark of the next level."""
 LEGEND = f"{RIGHT} right {WRONG} wrong {PEAK}{VALLEY} reversal {NEXT}next ┄cap"
+"""Meaning of the marks, in one line."""
 
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error", NEXT: "bold"}
+"""Style of each mark."""
 _FIRST = {WRONG: 1, RIGHT: 0, PEAK: 2, VALLEY: 2, NEXT: 3}
 """Where several marks share a cell, the highest is shown."""
 
 
 class LevelHistory(Widget):
-    """Fills all the room that it gets."""
+    """Draws a staircase in all the room that it gets: level over trials, answers and reversals as marks, the next
+    level, the cap as a dashed line."""
 
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
@@ -35,6 +40,8 @@ class LevelHistory(Widget):
         self._cap_n = 1.0
 
     def show(self, points: tuple[StaircasePoint, ...], next_n: float | None, cap_n: float) -> None:
+        """next_n: level of the next trial (N), None where it is not known; cap_n: the cap (N). Drawn anew only where
+        something changed."""
         if (points, next_n, cap_n) != (self._points, self._next_n, self._cap_n):
             self._points, self._next_n, self._cap_n = points, next_n, cap_n
             self.refresh()

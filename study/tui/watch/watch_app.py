@@ -20,7 +20,7 @@ from study.tui.watch.watch_source import WatchSource
 
 
 class WatchApp(App[None]):
-    """The experimenter's view in a terminal of its own."""
+    """The experimenter's view in a terminal of its own. F9 changes the colours; the other keys are the screen's."""
 
     TITLE = "hapteq watch"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("t", "next_theme", "Theme", show=False)]

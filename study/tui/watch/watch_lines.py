@@ -21,6 +21,7 @@ from study.tui.watch.watch_words import (
 )
 
 BELL = "\a"
+"""Lets the terminal ring."""
 LABEL_CELLS = 11
 """Width of the words before each line of `status`."""
 

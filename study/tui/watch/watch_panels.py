@@ -25,8 +25,10 @@ from study.tui.watch.watch_words import (
 )
 
 Piece = Content | str | tuple[str, str]
+"""A part of a line: text, text with its style, or content."""
 
 MUTED = "$foreground 65%"
+"""Style of what is less important."""
 _STANDING_STYLES = {
     "running": "bold $text-success",
     "paused": "bold $text-warning",
@@ -37,8 +39,11 @@ _STANDING_STYLES = {
     "refused": MUTED,
     "excluded": MUTED,
 }
+"""Style of each standing."""
 _RUN_SYMBOLS: dict[RunStatus, str] = {"done": "✓", "present": "▶", "to come": " "}
+"""A character for the state of a run."""
 _VERDICT_STYLES = {"right": "$text-success", "wrong": "$text-error", "LAPSE": "bold $text-error"}
+"""Style of a trial's result."""
 BAR_CELLS = 6
 """Characters of a bar."""
 

@@ -34,6 +34,7 @@ FORGOTTEN_AFTER_S = 10.0
 """An alarm that returns within this time is the same one; later it is new."""
 
 Key = tuple[str, str]
+"""An alarm's kind and when it began."""
 
 
 class AlarmBook:
@@ -48,10 +49,12 @@ class AlarmBook:
 
     @property
     def unseen(self) -> tuple[Alarm, ...]:
+        """Current alarms that were not acknowledged."""
         return tuple(alarm for alarm in self._alarms if _key(alarm) not in self._seen)
 
     @property
     def seen(self) -> tuple[Alarm, ...]:
+        """Current alarms that were acknowledged."""
         return tuple(alarm for alarm in self._alarms if _key(alarm) in self._seen)
 
     def take(self, alarms: Sequence[Alarm], now_s: float) -> bool:
@@ -100,7 +103,9 @@ class WatchMessage(Message):
 
 
 class WatchScreen(Screen[None]):
-    """The view, redrawn whenever a new one arrives, and the keys that send requests to the session."""
+    """The experimenter's view: standing and alarms, the staircase, last trials, runs, exposure and device; redrawn with
+    each new view. S or F8 stops the session, p pauses it, n and e write a note and an adverse event, a acknowledges
+    alarms, d shows details, q leaves."""
 
     HELP = HELP
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (126, "-wide")]  # noqa: RUF012 - as in the base class

@@ -14,9 +14,11 @@ SYMBOLS: dict[Standing, str] = {
     "refused": "○",
     "excluded": "○",
 }
+"""A character for each standing."""
 
 
 NOT_MEASURED_MARK = "n.m."
+"""In a table, in place of an acceleration that was not measured."""
 NOT_MEASURED = "answered too early to measure; counts"
 """Legend of the mark, short enough for a terminal of 80 columns."""
 

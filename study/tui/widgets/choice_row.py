@@ -18,7 +18,9 @@ GAP = 3
 
 
 class ChoiceRow(Widget, can_focus=True):
-    """Nothing is preselected, and moving over a choice does not select it: an agreement must be intended."""
+    """Choices side by side, or one below the other where they do not fit. Arrow keys move, Space or a click chooses,
+    Enter chooses and leaves, a digit chooses by number. Nothing is preselected, and moving over a choice does not
+    select it: an agreement must be intended."""
 
     DEFAULT_CSS = """
     ChoiceRow { height: auto; width: 1fr; }
@@ -40,6 +42,8 @@ class ChoiceRow(Widget, can_focus=True):
 
     @dataclass
     class Chosen(Message):
+        """A choice was made, be it the same one again."""
+
         row: "ChoiceRow"
 
     @dataclass

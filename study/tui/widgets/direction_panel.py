@@ -16,14 +16,17 @@ from study.tui.drawing.direction_picture import draw_large_direction, sentence
 from study.tui.drawing.number_picture import large_number
 
 NUMBERS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
+"""Large digits, three lines each."""
 BESIDE = 5
 """Columns left of the drawing for the number; the same number stays free on the right."""
 
 Mark = Literal["", "taken", "saved", "now", "felt"]
+"""What happened to this answer: it was taken, is on the disk, is played now, or was felt."""
 
 
 class DirectionPanel(Widget):
-    """picture None: an interval, which has no direction. The mark is a word in the frame, and a heavier frame."""
+    """Draws a large digit, the direction as a thick line in its colour, and its words. picture None: an interval, which
+    has no direction. The mark is a word in the frame, and a heavier frame."""
 
     DEFAULT_CSS = """
     DirectionPanel {

@@ -14,7 +14,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class FormQuestion(Vertical):
-    """A question with its answer, or its choices."""
+    """The numbered question, and below it its choices or what was written."""
 
     DEFAULT_CSS = """
     FormQuestion {
@@ -41,6 +41,7 @@ class FormQuestion(Vertical):
 
     @property
     def stacked(self) -> bool:
+        """Whether it has choices and they are listed vertically at this width."""
         return bool(self.field.choices) and self.query_one(ChoiceRow).stacked
 
     def show(self, given: FieldEntry, at: bool) -> None:

@@ -13,7 +13,8 @@ from study.tui.drawing.braille import Canvas
 
 
 class HandleTarget(Widget):
-    """Right and up as in the picture. A handle far away is drawn at the edge."""
+    """Draws the circle in which a trial may start, a cross in its centre, and the handle as a disc. Right and up as in
+    the picture. A handle far away is drawn at the edge."""
 
     DEFAULT_CSS = """
     HandleTarget { height: 1fr; min-height: 5; }
@@ -31,6 +32,7 @@ class HandleTarget(Widget):
 
 
 BOLD = Style(bold=True)
+"""Style of the drawing."""
 
 
 def _draw_target(view: HandleView, columns: int, rows: int) -> list[str]:

@@ -13,7 +13,8 @@ _LEAD = re.compile(r".{1,16}?\s{2,}")
 
 
 class LongText(ScrollView, can_focus=True):
-    """Lines of text, drawn as they scroll into view."""
+    """Lines of text, wrapped at the width of the widget and drawn as they scroll into view; arrow and page keys
+    scroll."""
 
     DEFAULT_CSS = "LongText { background: $background; }"
 
@@ -24,6 +25,7 @@ class LongText(ScrollView, can_focus=True):
         self._width = 0
 
     def show(self, lines: tuple[str, ...]) -> None:
+        """Replace the lines."""
         self._lines, self._width = lines, 0
         self._break(self.scrollable_content_region.width)
 

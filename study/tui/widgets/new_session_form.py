@@ -13,12 +13,14 @@ from study.session.views.participant_codes import code_problem, is_code, next_co
 from study.tui.home_messages import BeginWanted
 
 SIMULATED = "simulated"
+"""Device beside whose name the list says that nothing moves."""
 NOTHING_YET = [("…", "")]
 """Before the choices are known; cannot be selected."""
 
 
 class NewSessionForm(Vertical):
-    """Fields of a new session; posts the request to begin once they are valid."""
+    """Fields of a new session: participant, protocol, device, and a model where the protocol needs one. F5 or the
+    button posts the request to begin, once all are valid; a line below says what is not."""
 
     DEFAULT_CSS = """
     NewSessionForm { height: auto; border: round $primary; padding: 0 1; }

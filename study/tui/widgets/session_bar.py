@@ -13,7 +13,7 @@ DONE, LEFT = "━", "─"
 
 
 class SessionBar(Widget):
-    """Run and trial on the left, progress on the right."""
+    """One line: run and trial on the left; on the right a bar of what is done, its share, and the minutes left."""
 
     DEFAULT_CSS = """
     SessionBar { height: 1; padding: 0 1; background: $panel; color: $foreground; }

@@ -37,7 +37,8 @@ _BREATH_S = 0.01
 
 
 class SessionTable(DataTable[Content | str]):
-    """Rows are created in parts: the table draws only visible ones."""
+    """Rows of past sessions: Enter opens one, r resumes, w watches. Rows are created in parts: the table draws only
+    visible ones."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("enter", "select_cursor", "Open"),

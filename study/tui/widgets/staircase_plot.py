@@ -9,13 +9,15 @@ from study.session.views.archive_views import Staircase
 from study.tui.drawing.staircase_drawing import LABEL_COLUMNS, PEAK, RIGHT, VALLEY, WRONG, staircase_lines, summary
 
 _STYLES = {RIGHT: "$text-success", WRONG: "bold $text-error", PEAK: "bold", VALLEY: "bold $text-error"}
+"""Style of each mark."""
 MUTED = "$foreground 65%"
+"""Style of labels and of the sentence below."""
 _BESIDES = 2
 """Lines for title and sentence."""
 
 
 class StaircasePlot(Widget):
-    """A staircase, redrawn for the size of its widget."""
+    """Draws the title of a run, its staircase in the room that is left, and the run in a sentence."""
 
     DEFAULT_CSS = "StaircasePlot { height: 14; }"
 
