@@ -37,6 +37,7 @@ NOT_CLOSED = (
     "the device did not answer when it was closed: it got zero force, and its brakes may be off; what was measured is "
     "saved; switch it off before a hand touches the handle, and on again before the next session"
 )
+"""Written to stderr where the device did not confirm that it was closed."""
 
 PATIENCE_S = 1.0
 """Time granted beyond all fades, before a device that does not become still counts as lost."""

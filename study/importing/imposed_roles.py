@@ -24,6 +24,7 @@ _TURNED: dict[str, SignalRole] = {"command": "response", "response": "command", 
 """Role of a signal where the motion was imposed, by its role where the force is the command."""
 
 Role = SignalRole | Literal[""]
+"""Role of a signal; empty: not known yet."""
 
 
 def turn_imposed(columns: Sequence[ParsedName], by_name: Mapping[str, Array], roles: Sequence[Role]) -> list[Role]:

@@ -22,6 +22,7 @@ CALIBRATE = (
     "Push the handle gently into its calibration position, as the device's manual shows (or run the vendor's "
     "calibration program), then try again."
 )
+"""Advice for a device that does not know its place."""
 
 
 def load_library() -> Library:

@@ -54,6 +54,7 @@ BESIDE_S = 25.0
 """Seconds for fitting a model, page and figures beside the search, where seconds are asked for."""
 
 Progress = Callable[[str, float], None]
+"""Called with the current step and the share that is done, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ _MOST_OBJECTS, _MOST_VALUES = 2**21, 2**24
 _OURS = "hapteq"
 """Beginning of the names of hapteq's own formats."""
 _OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
-"""The same in the bytes of a document."""
+"""Bytes by which a document names one of these formats."""
 _LOOKED_AT = 4096
 """Bytes at the start of a file in which a format of ours names itself."""
 _UNIT_KEYS = ("unit", "units")

@@ -30,7 +30,7 @@ from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import is_peak_value, name_signal
 
 _UNITLESS = (*EMPTY, "1")
-# The pattern starts at the beginning of the text or at a bracket: otherwise a search would take quadratic time.
+"""Entries of a row of units that state none."""
 _BRACKETED = re.compile(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\[\]()]*[\])]")
 """A name with its unit in brackets. The match begins at the start of the text or at a bracket: otherwise a search would
 take quadratic time."""

@@ -17,6 +17,7 @@ KIND = "import map"
 """What messages call a map."""
 
 _ADAPTER: TypeAdapter[ImportMap] = TypeAdapter(ImportMap)
+"""Checks a map, and makes its schema."""
 MAP_SCHEMA: Node = _ADAPTER.json_schema()
 """JSON Schema of a map: docs/importing.md is made from it."""
 

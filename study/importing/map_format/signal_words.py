@@ -69,6 +69,7 @@ _ALONE: dict[str, SignalRole] = {
 }
 """Names of input and output, valid only as the whole name: an output speed is a speed."""
 _Role = SignalRole | Literal[""]
+"""Role of a signal; empty: not known yet."""
 _DRIVES, _FEEDS = ("force", "torque"), ("current", "voltage")
 _MOTIONS, _PLACES = ("acceleration", "velocity"), ("position", "angle")
 

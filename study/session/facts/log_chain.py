@@ -17,6 +17,7 @@ _FIELD, _END = b',"chain":"', b'"}'
 _LENGTH = len(_FIELD) + DIGITS + len(_END)
 """Bytes of the checksum's field at the end of a line."""
 _HEXADECIMAL = frozenset(b"0123456789abcdef")
+"""Bytes that a checksum may have."""
 
 
 @dataclass(frozen=True, slots=True)

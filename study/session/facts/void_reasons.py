@@ -3,7 +3,7 @@
 SCREEN_SILENT = "the screen gave no sign of life"
 """The screen process may have been suspended, hung, or waiting for a processor; the cause is unknown."""
 SCREEN_LATE = f"{SCREEN_SILENT}: the computer was too busy"
-"""The same, where load or the engine's own lateness shows that the computer was too busy."""
+"""`SCREEN_SILENT`, where load or the engine's own lateness shows the cause."""
 PROGRAM_STALLED = "the program gave no sign of life, so the force was faded out"
 """The session's process gave no sign of life within `watchdog_s`."""
 TICKS_MISSED = "of the 1 kHz ticks were missed"

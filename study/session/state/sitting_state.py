@@ -67,7 +67,7 @@ NIGHT_H = 10.0
 may fall into a sitting. Within a sitting the monotonic clock counts, between sittings the wall clock: setting it
 forward by this much there passes for a night, unless it is set back later."""
 NIGHT_S = 3600 * NIGHT_H
-"""The same in seconds."""
+"""`NIGHT_H` in seconds."""
 
 
 def fill_in(sitting: SittingState, event: FormFilled) -> SittingState:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Standing = Literal["finished", "unfinished", "running", "refused", "excluded", "withdrawn", "unreadable"]
-"""How far a past session is. `running`: a program has its folder open; `refused`, `excluded`: the participant did not
+"""How far a past session is. `running`: a program writes its log now; `refused`, `excluded`: the participant did not
 take part; `withdrawn`: only a tombstone is left."""
 
 TURNED_AWAY = {

@@ -20,7 +20,7 @@ HEARING = {
 }
 """Choices of the set-up form: what is logged, and the key of what the participant reads."""
 GRIPS = {"pen grip": "grip_pen", "whole hand": "grip_hand", "finger tips": "grip_tips", "other": "grip_other"}
-"""The same for the grip of the handle."""
+"""Grips of the handle to choose from: what is logged, and the key of what the participant reads."""
 HANDS = {"right": "hand_right", "left": "hand_left"}
 """Answers as they are logged, and the keys of their texts."""
 

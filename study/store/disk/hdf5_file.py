@@ -33,6 +33,7 @@ BROKEN_SEAL = (
     "its content does not fit the check sum at its beginning: it was damaged, cut off, or changed by another program "
     "since it was written"
 )
+"""Problem of a file whose content differs from its seal."""
 
 
 class Problems:

@@ -16,6 +16,7 @@ from study.store.formats.answer_table import AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 NAME = "trials.mat"
+"""Name of the exported file."""
 
 
 def write_trials_mat(

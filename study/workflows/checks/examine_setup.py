@@ -42,6 +42,7 @@ class Examination:
 
     @property
     def findings(self) -> tuple[DeviceFinding, ...]:
+        """All findings: installation, device, then timing."""
         timing = self.timing.findings if self.timing is not None else ()
         return (*self.installation, *self.device.findings, *timing)
 

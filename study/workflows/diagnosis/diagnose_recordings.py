@@ -44,6 +44,7 @@ TWIN_REMARK = (
     "No model was given. The session was compared with the simulated device's twin: a linear model, identified from "
     "recordings without a hand at the handle, as `hapteq twin` writes it."
 )
+"""Remark in the result of a session's diagnosis without a given model."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, make_
 REST_S = 2.0
 """Rest (s) before the first play, to measure the sensor's noise."""
 AGAIN = "Start again; a run for the same trajectory and model can go on from forces that were written."
+"""What to do after an interruption or a fault."""
 
 OnProgress = Callable[[int, float], None]
 """Called with the number of the play, from 0, and the share of it that is done."""

@@ -80,6 +80,7 @@ kind = "noise"
 start_s = 1.0
 role = "test"
 """
+"""The page's example of a map."""
 
 _INTRODUCTION = f"""\
 # Importing recordings of others
@@ -190,6 +191,7 @@ With `hold = "zero-order"`, `command[k]` is held from t_k to t_(k+1) and `respon
 
 Two loggers write a table each: `drive_3.csv` with the columns `t,counts,current`, `daq_3.csv` with
 `time [s],velocity [mm/s],load cell [V]`."""
+"""Beginning of the page."""
 
 
 def importing_markdown() -> str:

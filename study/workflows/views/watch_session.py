@@ -154,6 +154,7 @@ class Follower:
 
 
 _FIRST = "The first line of the log of {} is none that this version knows."
+"""Why a session cannot be followed; the session's name is filled in."""
 
 
 def _not_ours(why: str) -> StudyError:
