@@ -31,7 +31,7 @@ _LONGEST_LINE = 2**20
 _LONGEST_SHOWN = 60
 """Most characters of a field that are quoted in a sentence about it."""
 _HOLDS_NUMBER = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;\t|]|$)')
-"""Matches a line with a field that is a number, whatever mark delimits its fields."""
+"""Matches a line with a field that is a number, with any delimiter between its fields."""
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
 """A number with marks between thousands, which is not read."""
 _MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
