@@ -131,6 +131,7 @@ class StaircaseRule:
 
     @property
     def is_bayesian(self) -> bool:
+        """Whether the Psi method chooses the levels in place of the up-down rule."""
         return self.bayesian.trials > 0
 
     @model_validator(mode="after")

@@ -46,6 +46,7 @@ class StaircaseState:
 
     @property
     def reversals(self) -> int:
+        """Number of reversals so far, those at the cap included; 0 where Psi chooses the levels."""
         return len(self.reversal_levels_db)
 
 

@@ -61,10 +61,13 @@ class StudyPlan:
     """Number of the next participant."""
 
     def count(self, progress: Progress) -> int:
+        """Number of participants with this progress, those without a place in the balanced order included."""
         return sum(each.progress == progress for each in self.participants)
 
     @property
     def next_cell(self) -> Cell | None:
+        """Cell of the next participant: numbers beyond a cycle begin again at the first cell. None where `cells` is
+        empty."""
         return self.cells[self.next_number % len(self.cells)] if self.cells else None
 
     @property
