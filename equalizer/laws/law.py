@@ -42,6 +42,7 @@ class Law:
 
     @property
     def tree(self) -> Node:
+        """Syntax tree of the expression; its free numbers are nodes `Free` with their place."""
         return parse_formula(self.expression, template=True)[0]
 
     @property
@@ -60,6 +61,7 @@ class Law:
         return tuple(sorted({node.name for node in nodes(self.tree) if isinstance(node, Variable)} - {"pi"}))
 
     def with_numbers(self, numbers: Sequence[float]) -> "Law":
+        """The law with other values of p0, p1, … in SI units. Raises LawError for another number of them."""
         return replace(self, numbers=tuple(float(number) for number in numbers))
 
 

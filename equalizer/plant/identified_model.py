@@ -64,6 +64,7 @@ class IdentifiedModel(Summarised):
 
     @property
     def order(self) -> int:
+        """Number of states, n."""
         return int(self.A.shape[0])
 
     @property

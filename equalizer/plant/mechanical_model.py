@@ -109,18 +109,22 @@ class MechanicalModel(Summarised):
 
     @property
     def system(self) -> UnitSystem:
+        """Units of its parameters: `units`, else SI, linear or rotational."""
         return self.units or (ROTATIONAL if self.rotational else LINEAR)
 
     @property
     def coordinates(self) -> int:
+        """Number of coordinates, n."""
         return int(self.mass.shape[0])
 
     @property
     def inputs(self) -> int:
+        """Number of commands, m."""
         return int(self.input.shape[1])
 
     @property
     def outputs(self) -> int:
+        """Number of responses, p."""
         return int(self.output.shape[0])
 
     def summary(self) -> Summary:

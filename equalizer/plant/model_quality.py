@@ -39,6 +39,7 @@ class ModelQuality:
 
     @property
     def tested(self) -> bool:
+        """Whether the model was tested on a held-out record."""
         return self.held_out_error is not None
 
 

@@ -55,6 +55,7 @@ class Grid:
     count: int
 
     def times_s(self) -> FloatArray:
+        """(count,): the instants, in s."""
         return self.start_s + np.arange(self.count) / self.rate_hz
 
 

@@ -54,9 +54,11 @@ class Signal:
 
     @property
     def duration_s(self) -> float:
+        """Number of samples over the rate: from the first sample to one step after the last."""
         return len(self) / self.sample_rate_hz
 
     def times_s(self) -> FloatArray:
+        """(n,): time of each sample in s, the first at 0."""
         return np.arange(len(self), dtype=np.float64) / self.sample_rate_hz
 
     def part(self, start: int, stop: int) -> Self:

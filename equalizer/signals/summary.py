@@ -18,6 +18,7 @@ class Summary:
 
     @property
     def html(self) -> str:
+        """An HTML table, the title as its caption; text is escaped."""
         rows = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in self.rows)
         return f"<table><caption>{escape(self.title)}</caption>{rows}</table>"
 
@@ -28,6 +29,7 @@ class Summarised:
     __slots__ = ()
 
     def summary(self) -> Summary:
+        """Title and main numbers, for printing. Every subclass defines it; else TypeError is raised."""
         raise TypeError(f"{type(self).__name__} has no summary")
 
     def __repr__(self) -> str:

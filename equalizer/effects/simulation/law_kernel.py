@@ -81,6 +81,11 @@ def _end_share(start: float, first: float, second: float) -> float:
 
 @compile_law
 def law_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """Force (N) of a discovered law over a step, solved for, because the motion at the step's end depends on it.
+
+    parameters: in the order of `AXES` to `TABLE`, then the conditions' samples and the program. memory: stack, signals,
+    and the operators' memory, which is advanced to the step's end. at: see `instant`; F_END is written.
+    """
     heavy = parameters[ACCELERATION] != 0.0
     start = low = _law_value(parameters, memory, at, START, 0.0, 0.0)
     conditions = int(parameters[CONDITIONS])

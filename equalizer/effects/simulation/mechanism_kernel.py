@@ -100,6 +100,7 @@ class LawAddress(types.WrapperAddressProtocol):
 
 @cache
 def law_address(law: Any) -> LawAddress:
+    """Address of a law that `compile_law` compiled; each law is looked up once per process."""
     return LawAddress(law)
 
 
@@ -173,6 +174,7 @@ def _write_seen_ports(per_newton: FloatArray, port: int, ports: FloatArray, at: 
 
 @compile_law
 def no_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """Law without force (0 N): fills the kernel's `LAWS` places where fewer laws act."""
     return 0.0
 
 

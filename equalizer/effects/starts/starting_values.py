@@ -25,6 +25,7 @@ class AxisMotion:
     """The missing force."""
 
     def where(self, keep: npt.NDArray[np.bool_]) -> "AxisMotion":
+        """The samples where `keep` (n,) is true; their times need not be evenly spaced."""
         return AxisMotion(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
 

@@ -35,6 +35,7 @@ class OnsetRule:
 
     @property
     def sentence(self) -> str:
+        """Definition of the onset in words for reports, with width and threshold; a clause without a full stop."""
         return (
             f"lowest frequency at which the worst ratio of acceleration across to acceleration along, averaged over "
             f"1/{1 / self.octaves:.3g} octave, passes {100 * self.threshold:g} %"

@@ -35,6 +35,7 @@ class Experiment:
 
     @property
     def periods(self) -> int:
+        """Number of periods, 1 for a single window; `effective_periods` is how many of them are independent."""
         return len(self.command)
 
     @property

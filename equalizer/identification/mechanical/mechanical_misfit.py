@@ -93,6 +93,7 @@ class LineGroup:
     hold: Hold
 
     def without_left_out(self) -> "LineGroup":
+        """The lines that are fitted, without those held out for cross-validation."""
         return self.of_lines(~self.left_out)
 
     def thin_out(self, most: int) -> "LineGroup":

@@ -94,6 +94,9 @@ class Structure:
 
     @cached_property
     def slices(self) -> dict[str, slice]:
+        """Places in the vector of unknowns, in its order: Cholesky factors of mass, damping and stiffness, output rows
+        of the further sensors, rotation, joint, delay; then per mode the logarithms of frequency and damping ratio, the
+        participations, the sensor shape. Slices of what the structure lacks are empty."""
         m, p = self.inputs, self.outputs
         pairs = m * (m + 1) // 2
         seen = p if self.shared else p - m
@@ -108,10 +111,12 @@ class Structure:
 
     @property
     def parameters(self) -> int:
+        """Number of unknowns."""
         return int(self.slices["modes"].stop)
 
     @property
     def coordinates(self) -> int:
+        """Number of the model's coordinates: driven axes, as many beyond a joint, and a coordinate per mode."""
         return (2 if self.joint else 1) * self.inputs + self.modes
 
     @property
@@ -196,6 +201,7 @@ class Structure:
         return low, high
 
     def delay_s(self, unknowns: FloatArray) -> float:
+        """Delay of the command (s), not negative: fitted where `delayed`, else that of `actuator`."""
         if not self.delayed:
             return self.actuator.delay_s
         return max(float(unknowns[self.slices["delay"]][0]) * self.step_s, 0.0)

@@ -59,10 +59,12 @@ class IdentificationSettings:
 
     @property
     def centre_hz(self) -> float:
+        """Geometric mean of the band's ends."""
         low, high = self.band_hz
         return float((low * high) ** 0.5)
 
     @property
     def wide(self) -> bool:
+        """Whether the band spans more than `WIDE_OCTAVES`."""
         low, high = self.band_hz
         return bool(high > low * 2.0**WIDE_OCTAVES)

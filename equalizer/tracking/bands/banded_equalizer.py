@@ -100,10 +100,13 @@ class BandedEqualizer:
 
     @property
     def causal(self) -> bool:
+        """Whether the split is causal: forces then begin with the first wanted row."""
         return isinstance(self.split, CausalSplit)
 
     @property
     def latency_samples(self) -> int:
+        """Rows of the forces before the one that belongs to the first wanted row: filter delay, and padding unless
+        causal."""
         return self.split.latency_samples + (0 if self.causal else self._padding)
 
     @property

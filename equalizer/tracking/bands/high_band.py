@@ -25,9 +25,10 @@ DIRECTIONS = 64
 
 
 class ResponseSource(Protocol):
-    """A response at any frequency, (lines,) to (lines, p, m)."""
+    """Frequency response of a device, defined at any frequency."""
 
-    def at(self, frequency_hz: FloatArray) -> ComplexArray: ...
+    def at(self, frequency_hz: FloatArray) -> ComplexArray:
+        """(lines, p, m): complex response at frequencies (lines,), m/s² per N."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +43,8 @@ class ModelledResponse:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredResponse:
-    """Magnitude and phase are interpolated linearly between its lines, and held constant outside."""
+    """Measured frequency response as a `ResponseSource`: magnitude and phase are interpolated linearly between its
+    lines, and held constant outside."""
 
     frequency_hz: FloatArray
     """(lines,), rising"""

@@ -9,7 +9,9 @@ class Equalizer(Protocol):
     """Turns a signal wanted at the handle into commands."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name that a session's log states for it: "none (commanded force)", or kind, order and band of the model."""
+        ...
 
     @property
     def takes(self) -> str:
@@ -33,6 +35,7 @@ class Identity:
     takes = "force"
 
     def periodic(self, wanted: Signal) -> Signal:
+        """The wanted force itself. Raises ValueError for another quantity than force."""
         if wanted.quantity != "force":
             raise ValueError(f"without an equalizer only a force can be played, not {wanted.quantity}; give a model")
         return wanted

@@ -35,6 +35,8 @@ class ModelEqualizer:
         return "acceleration"
 
     def periodic(self, wanted: Signal) -> Signal:
+        """Forces of one loop in the periodic steady state. Raises OutsideBandError where something is wanted
+        outside the model's band, ValueError for another rate or unit."""
         return periodic_command(self.model, wanted, self.weight, self.spring)
 
     def onset(self, wanted: Signal, envelope: FloatArray) -> Signal:

@@ -48,6 +48,7 @@ class Trajectory:
 
     @property
     def kind(self) -> TableKind:
+        """Layout of its table, by quantity and channels: FORCES, TRANSIENT or TRAJECTORY."""
         if self.signal.quantity == FORCES.quantity:
             return FORCES
         return TRANSIENT if self.signal.channels == TRANSIENT.header[1:] else TRAJECTORY
@@ -63,7 +64,7 @@ class Trajectory:
 
 
 def parse_trajectory(text: str) -> Trajectory:
-    """A table of either kind, told apart by its header. Raises TableError."""
+    """A table of one of `TABLE_KINDS`, which its header tells apart. Raises TableError."""
     try:
         rows = list(csv.reader(io.StringIO(text.rstrip())))
     except csv.Error as error:

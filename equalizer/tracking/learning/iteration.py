@@ -75,6 +75,7 @@ class Repetition:
         return self.residual(self.part(self.wanted))
 
     def part(self, samples: FloatArray) -> FloatArray:
+        """Part of samples (N, channels) within the band; they begin and end at rest, or are noise."""
         return band_part(samples, self.sample_rate_hz, self.band_hz)
 
     @property
@@ -94,6 +95,7 @@ class Repetition:
 
     @property
     def limits(self) -> str:
+        """The limits of force and slew rate in words, for remarks; empty without limits."""
         cap = [] if self.cap is None else [f"the force within {self.cap:g} N"]
         return " and ".join([*cap, *([] if self.slew is None else [f"its change within {self.slew:.4g} N/s"])])
 

@@ -28,6 +28,7 @@ class Peaks:
 
     @property
     def fits(self) -> bool:
+        """Whether no force exceeds the cap; a force equal to it fits."""
         return self.peak_n <= self.cap_n
 
     @property

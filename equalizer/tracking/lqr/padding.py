@@ -30,6 +30,7 @@ class Padding:
                 raise TrackingError(f"{name} is {value}; it must be a number that is not negative")
 
     def samples(self, rate_hz: float) -> tuple[int, int]:
+        """Numbers of rows before and after at a sample rate, rounded to whole rows."""
         return round(self.before_s * rate_hz), round(self.after_s * rate_hz)
 
 

@@ -76,6 +76,7 @@ class TrackingProblem:
 
     @property
     def inputs(self) -> int:
+        """Number of forces, m."""
         return int(self.B.shape[1])
 
     @cached_property

@@ -59,6 +59,7 @@ class RealtimeController:
 
     @property
     def problem(self) -> TrackingProblem:
+        """Model matrices and cost, common to both controllers."""
         return self.tracker.problem
 
     def simulate_stream(self, wanted: FloatArray) -> tuple[Bands, TrackResult]:

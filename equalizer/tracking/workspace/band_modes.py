@@ -42,10 +42,11 @@ class BandMode:
 
     @property
     def pole(self) -> complex:
+        """Discrete pole with the positive imaginary part, exp(s / sample_rate_hz)."""
         return complex(_poles(np.array([self.natural_hz]), np.array([self.damping_ratio]), self.sample_rate_hz)[0])
 
     def response(self, z: ComplexArray) -> ComplexArray:
-        """(lines, p, m)"""
+        """(lines, p, m): response at points z (lines,) of the unit circle."""
         upper, lower = 1 / (z - self.pole), 1 / (z - self.pole.conjugate())
         return np.asarray(upper[:, None, None] * self.residue + lower[:, None, None] * self.residue.conj())
 
@@ -56,7 +57,9 @@ class BandLines:
 
     frequency_hz: FloatArray
     z: ComplexArray
+    """(lines,): these frequencies as points of the unit circle."""
     response: ComplexArray
+    """(lines, p, m)"""
     size: FloatArray
     """(lines,): Frobenius norm of the response."""
     inside: np.ndarray[tuple[int], np.dtype[np.bool_]]

@@ -61,6 +61,8 @@ class InterpolationChoice:
     """Interpolation by the modes of all models; None where it is not used."""
 
     def at(self, place_m: Place) -> ModelsAtPlace:
+        """Models and weights for a place by the chosen interpolation. A place outside the models' hull gets those of
+        the nearest place inside, with a remark."""
         return self.modal.at(place_m) if self.modal else blend_at(self.workspace, place_m)
 
 

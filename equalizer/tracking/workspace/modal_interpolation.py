@@ -42,6 +42,8 @@ class ModalInterpolation:
     """(models, lines, p, m)"""
 
     def at(self, place_m: Place) -> ModelsAtPlace:
+        """A single model for a place, which resonances and remainder at their interpolated values give, valid in the
+        models' common band. Remarks: a place outside the models' hull, a poor fit of the remainder."""
         weights = place_weights(self.workspace.places_m, place_m)
         modes = [_interpolate_mode(track, weights.smooth) for track in self.tracks]
         remainder = np.einsum("k,klpm->lpm", weights.linear, self.remainders)

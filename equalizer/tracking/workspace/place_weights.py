@@ -39,6 +39,7 @@ class PlaceWeights:
 
     @property
     def remark(self) -> str | None:
+        """Sentence for the user on a place more than `OUTSIDE_M` outside the hull; else None."""
         if self.outside_m <= OUTSIDE_M:
             return None
         return (

@@ -54,6 +54,7 @@ class WorkspaceModels:
         return max(model.band_hz[0] for model in self.models), min(model.band_hz[1] for model in self.models)
 
     def without(self, index: int) -> "WorkspaceModels":
+        """All models but that of this index, from 0. Raises WorkspaceError where none is left."""
         return WorkspaceModels(self.models[:index] + self.models[index + 1 :])
 
 
