@@ -76,6 +76,7 @@ class Drift:
 
     @property
     def unit(self) -> str:
+        """Unit of `change`, `error` and `before`; empty for a gain, whose change is relative."""
         return UNITS[self.number]
 
 

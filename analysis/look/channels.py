@@ -28,6 +28,7 @@ class Channel:
 
     @property
     def label(self) -> str:
+        """Role and name, such as: response 'ax'."""
         return f"{self.role} '{self.name}'"
 
     @property

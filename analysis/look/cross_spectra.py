@@ -30,10 +30,12 @@ class CrossSpectra:
     """Labels of the channels."""
 
     def power(self, channel: int) -> FloatArray:
+        """(lines,): power spectral density of a channel, in its unit² / Hz. channel: its index."""
         density: FloatArray = self.matrix[:, channel, channel].real
         return density
 
     def coherence(self, first: int, second: int) -> FloatArray:
+        """(lines,): magnitude-squared coherence of two channels, 0 to 1; 0 where either has no power."""
         both = np.sqrt(self.power(first)) * np.sqrt(self.power(second))
         return np.asarray((np.abs(self.matrix[:, first, second]) / np.where(both > 0, both, np.inf)) ** 2)
 

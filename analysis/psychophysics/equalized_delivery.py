@@ -25,6 +25,7 @@ class Delivery:
 
     @property
     def is_as_wanted(self) -> bool:
+        """Whether what was delivered is within `NEAR` of what was wanted, along the direction and off it."""
         return self.off_axis <= NEAR and all(abs(ratio - 1) <= NEAR for ratio in self.along if ratio is not None)
 
 

@@ -80,6 +80,7 @@ class CommandLaw:
         return replace(self, scale=self.scale * float(given @ command) / max(float(given @ given), 1e-300))
 
     def as_formula(self) -> Formula | None:
+        """Formula of the force with these values and scale; None where the catalogue has the effect."""
         return None if self.formula is None else self.formula(self.values, self.scale)
 
 

@@ -70,6 +70,7 @@ class Balance:
 
     @property
     def named(self) -> tuple[JudgedLaw, ...]:
+        """Those of `laws` that are to be named, in their order."""
         return tuple(each for each in self.laws if each.named)
 
     @property

@@ -85,4 +85,5 @@ def special_cases(effect: str) -> tuple[str, ...]:
 
 
 def family_of(effect: str) -> set[str]:
+    """Effects that may form a class with this one, itself included; it alone where it is in none of `FAMILIES`."""
     return next((family for family in FAMILIES if effect in family), {effect})

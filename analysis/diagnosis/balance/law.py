@@ -50,6 +50,7 @@ class Law:
 
     @property
     def key(self) -> tuple[str, int]:
+        """Effect and channel: laws with the same key differ in their parameters only."""
         return self.effect, self.channel
 
 

@@ -44,9 +44,11 @@ class Structure:
 
     laws: tuple[int, ...]
     errors: FloatArray
+    """(folds,)"""
 
     @property
     def error(self) -> float:
+        """Cross-validated sum of squares over all folds."""
         return float(self.errors.sum())
 
 

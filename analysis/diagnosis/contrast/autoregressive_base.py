@@ -24,12 +24,14 @@ class AutoregressiveBase:
 
     channel: int
     order: int
+    """Number of past samples of responses and commands that predict."""
     step: int
     """Decimation step, after a low pass."""
     responses: int
     """Number of response channels."""
 
     def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+        """Per part (kept, 1 + columns), from the sample of index `order` on after decimation. `like` is not used."""
         return tuple(self._rows(part) for part in parts)
 
     def command_columns(self, width: int) -> Mask:
@@ -37,6 +39,7 @@ class AutoregressiveBase:
         return (np.arange(width) > self.order * self.responses) & (np.arange(width) < width - 1)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
+        """Per part, mask of its rows: those made from known samples, without the first two and the last two."""
         found = []
         for part in parts:
             known = part.known[:: self.step]

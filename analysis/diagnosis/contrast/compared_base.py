@@ -47,6 +47,7 @@ class RecordingSet:
 
     @property
     def count(self) -> int:
+        """Number of valid rows, over all parts."""
         return sum(int(mask.sum()) for mask in self.masks)
 
 

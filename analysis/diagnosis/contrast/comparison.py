@@ -58,12 +58,15 @@ class Comparison:
     usual_clean: float
     """The same of the clean set alone."""
     by_force: bool
+    """Whether the bases of the device are force balances; else they are autoregressions."""
     step_s: float
+    """Time from one row to the next."""
     complete: bool
     """Whether all faults were tested before the time ran out."""
 
     @property
     def excess(self) -> float:
+        """Sum of squares of one base for both sets over that of separate bases, less 1: 0 = the sets are alike."""
         return float(self.plain.sum()) / self.samples - 1
 
     @property

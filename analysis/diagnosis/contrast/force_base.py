@@ -47,6 +47,7 @@ class ForceBase:
         return tuple(found)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
+        """Per part, mask of its rows: known samples more than a filter length from the part's ends."""
         return tuple(
             motion.valid_samples(part.known)
             for motion, part in zip(

@@ -27,12 +27,14 @@ ROUNDS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grams:
-    """(blocks, k, k): products of the columns, and of those that change with each size."""
+    """Products of the columns of the rows and of their changes with a fault of size 1 undone, block by block."""
 
     blocks: FloatArray
+    """(blocks, k, k): the columns first, then their changes, size by size."""
     changed_columns: tuple[Places, ...]
     """Per size, the columns that change."""
     width: int
+    """Number of columns without the changes."""
 
     def is_well_conditioned(self, variant: Variant) -> bool:
         """Whether undoing the fault is well-conditioned. Sizes that may have any value are in SI units (a mass of 1 kg
@@ -65,15 +67,17 @@ class Grams:
         return np.asarray(spread @ self.blocks @ spread.T)
 
     def part(self, blocks: Sequence[int]) -> FloatArray:
+        """(k, k): sum of the products of these blocks."""
         return np.asarray(self.blocks[list(blocks)].sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Blocks of one compared: those in which a fault is undone, and those without it."""
+    """Blocks of a compared base: those in which a fault is undone, and those without it."""
 
     with_it: Grams
     at: tuple[int, ...]
+    """Indices in `with_it` of the blocks with the fault."""
     without: tuple[FloatArray, ...]
     """Products of plain rows (width, width), one per block."""
     may_grow: float = 1.0
@@ -97,10 +101,11 @@ class Fit:
 
     sizes: FloatArray
     errors: FloatArray
-    """(blocks with, then without): white sums of squares, over all compared_bases."""
+    """(blocks with, then without): sums of squares of whitened errors, over all compared bases."""
 
     @property
     def error(self) -> float:
+        """Sum of squares over all blocks."""
         return float(self.errors.sum())
 
 

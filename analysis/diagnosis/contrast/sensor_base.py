@@ -27,9 +27,12 @@ class SensorBase:
     step: int
 
     def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
+        """Per part (kept, 1 + columns): a filtered reading; then the differentiated position at the same time and up to
+        `SENSOR_TAPS` rows before and after, and 1. `like` is not used."""
         return tuple(self._rows(part) for part in parts)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
+        """Per part, mask of its rows: known samples more than a period of `band_hz` from the part's ends."""
         found = []
         for part in parts:
             edge = int(part.rate_hz / self.band_hz) + 1

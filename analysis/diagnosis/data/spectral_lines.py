@@ -43,6 +43,7 @@ class DetectionLines:
 
     @property
     def any_silent(self) -> bool:
+        """Whether there is a silent line that distortion would reach."""
         return bool((self.odd | self.even | self.either).any())
 
 

@@ -46,6 +46,7 @@ class Sum:
 
     @property
     def variables(self) -> tuple[str, ...]:
+        """Signals in the terms and in those of the partner, sorted."""
         own = frozenset[str]().union(*(term.variables for term in self.terms))
         return tuple(sorted(own.union(() if self.partner is None else self.partner.variables)))
 

@@ -39,6 +39,7 @@ class Term:
 
     @property
     def variables(self) -> frozenset[str]:
+        """Signals in the formula, by the names of `Columns`."""
         return frozenset(_SIGNAL.findall(self.shape))
 
 

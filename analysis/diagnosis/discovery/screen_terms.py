@@ -35,6 +35,7 @@ class Products:
 
     @property
     def blocks(self) -> list[slice]:
+        """Samples of each block, as slices of (s,)."""
         edges = self.view.edges
         return [slice(a, b) for a, b in pairwise(edges)]
 

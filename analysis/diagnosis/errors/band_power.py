@@ -48,6 +48,8 @@ class BandPower:
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
+        """Per segment (rest left out) and role, the longest run of its samples, where that has `LEAST` or more. Without
+        segments, pieces of `LONGEST_S` take their place."""
         return tuple(
             Stretch(number, first, last, part)
             for number, record in enumerate(self.measure.records)

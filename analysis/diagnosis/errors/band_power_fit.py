@@ -96,6 +96,7 @@ class BandPowerFit:
     """(parameters,): standard errors of the point; empty before a step."""
 
     def off(self, view: View) -> FloatArray:
+        """(stretches, bands, c): logarithm of the measured over the predicted amplitude; NaN below the noise."""
         return np.asarray(view.power.measured - self.predicted)
 
 

@@ -45,6 +45,7 @@ class FreeSimulation:
     """Per record, where its parts were joined, and the states in which these begin; empty where records are whole."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
+        """The measure on other records, also of another length: each is taken as whole, and `pieces` is emptied."""
         return replace(self, records=records, pieces=())
 
     def with_floor(self, rms: FloatArray) -> Self:

@@ -35,6 +35,7 @@ class Tuning:
     MechanicalModelError where the mass is not positive definite."""
 
     def values(self, deviations: FloatArray) -> FloatArray:
+        """(parameters,): deviations, in standard deviations, as changes of the parameters, SI or relative."""
         return np.asarray(deviations * self.deviation)
 
 

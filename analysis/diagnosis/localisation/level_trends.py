@@ -39,6 +39,7 @@ class LevelTrend:
 
     @property
     def present(self) -> bool:
+        """Whether the distortion is significant at any level: p below `DISTORTION_P`."""
         return self.p_value < DISTORTION_P
 
     @property

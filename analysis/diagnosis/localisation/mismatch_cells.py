@@ -37,6 +37,7 @@ class Margin:
     learned: CleanFloor = field(default_factory=CleanFloor)
 
     def of(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
+        """Margin of a cell, as a share of its signal."""
         return float(np.hypot(self.share, self.learned.share(output, quantity, input, band_hz)))
 
 
@@ -83,6 +84,7 @@ class MismatchCell:
 
     @property
     def significant(self) -> bool:
+        """Whether the adjusted p-value is at most `FALSE_DISCOVERY_RATE`."""
         return self.adjusted_p_value <= FALSE_DISCOVERY_RATE
 
 

@@ -42,6 +42,7 @@ class NoiseFloor:
 
     @property
     def known(self) -> bool:
+        """Whether the noise could be estimated; else every rms is NaN."""
         return self.how != "unknown"
 
 

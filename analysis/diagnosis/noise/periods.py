@@ -32,14 +32,16 @@ class Periods:
 
     @property
     def length(self) -> int:
+        """Samples of one period."""
         return self.segment.period
 
     @property
     def count(self) -> int:
+        """Number of usable periods."""
         return len(self.starts)
 
     def frequency_hz(self, sample_rate_hz: float) -> FloatArray:
-        """(lines,)"""
+        """(lines,): frequencies of the lines of `spectra`."""
         lines: FloatArray = np.arange(1.0, (self.length + 1) // 2) * (sample_rate_hz / self.length)
         return lines
 

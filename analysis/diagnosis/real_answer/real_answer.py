@@ -44,9 +44,11 @@ class OwnNumber:
     low: float | None
     high: float | None
     nominal: float | None
+    """The value known by other means; None = not known."""
 
     @property
     def holds_nominal(self) -> bool | None:
+        """Whether the interval contains the nominal value; None where either is not known."""
         if self.nominal is None or self.low is None or self.high is None:
             return None
         return self.low <= self.nominal <= self.high

@@ -101,6 +101,7 @@ class Explanation:
 
     @property
     def stages(self) -> dict[str, Fitted]:
+        """The fits by the name of their stage: "before", "retuned", "after"."""
         return {"before": self.before.fitted, "retuned": self.retuned.fitted, "after": self.after.fitted}
 
 

@@ -33,9 +33,11 @@ class Step:
 
     what: str
     begun: float
+    """Share of the whole work that is done before it, 0 to 1."""
     progress: Progress
 
     def at(self, share: float) -> None:
+        """Report progress. share: of this step, 0 to 1; the step is 0.3 of the whole work."""
         self.progress(self.what, self.begun + 0.3 * share)
 
 

@@ -25,11 +25,12 @@ class FollowUp:
 
     @property
     def resolved(self) -> bool:
-        """The one right name is left."""
+        """Whether the concealed effect alone is left after the proposed recording."""
         return self.after_proposed == (self.effect,)
 
     @property
     def resolved_by_chance(self) -> bool:
+        """Whether the concealed effect alone is left after the recording drawn at random."""
         return self.after_drawn == (self.effect,)
 
 

@@ -36,10 +36,13 @@ class InjectedOutcome:
 
     @property
     def injected(self) -> str:
+        """The injected effects in a line, joined by " + "; empty without any."""
         return " + ".join(self.effects)
 
     @property
     def detectable(self) -> bool:
+        """Whether the fault changes the error by the factor `DETECTABLE`, up or down; False without a fault, or where
+        `change` is not known."""
         if not self.effects or self.change is None:
             return False
         return self.change >= DETECTABLE or self.change <= 1 / DETECTABLE
@@ -61,6 +64,7 @@ class InjectedOutcome:
 
     @property
     def right(self) -> bool:
+        """Whether `judged` is "named", "in class" or, without a fault, "nothing named"."""
         return self.judged in ("named", "in class", "nothing named")
 
 

@@ -47,18 +47,22 @@ class Outcome:
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The concealed effects, in the order of `concealed`."""
         return tuple(each.effect for each in self.concealed)
 
     @property
     def named(self) -> tuple[NamedEffect, ...]:
+        """Effects that the diagnosis names, with their parameters; empty where it failed."""
         return () if self.diagnosis is None else self.diagnosis.effects
 
     @property
     def named_names(self) -> tuple[str, ...]:
+        """The effects of `named`, without their parameters."""
         return tuple(each.effect for each in self.named)
 
     @property
     def verdict(self) -> str:
+        """The diagnosis' verdict; "failed" where there is no diagnosis."""
         return "failed" if self.diagnosis is None else self.diagnosis.verdict
 
     @property

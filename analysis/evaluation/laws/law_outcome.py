@@ -9,7 +9,7 @@ from equalizer.effects.discovered_law import has_memory
 from equalizer.laws.law import Law, law_of
 
 CLOSE = 0.05
-"""Relative error up to which a law counts as the same function (issue 16)."""
+"""Relative error up to which a law counts as the same function."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +50,12 @@ class LawOutcome:
 
     @property
     def named(self) -> tuple[Law, ...]:
+        """Laws that the diagnosis names, without effects of the catalogue; empty where it failed."""
         return _collect_laws(() if self.diagnosis is None else self.diagnosis.effects)
 
     @property
     def candidates(self) -> tuple[Law, ...]:
+        """Laws among the candidates that the diagnosis does not name; empty where it failed."""
         return _collect_laws(() if self.diagnosis is None else self.diagnosis.candidates)
 
     @property
@@ -70,9 +72,12 @@ class LawOutcome:
 
     @property
     def verdict(self) -> str:
+        """The diagnosis' verdict; "failed" where there is no diagnosis."""
         return "failed" if self.diagnosis is None else self.diagnosis.verdict
 
     def left(self, stage: str) -> float:
+        """Rms error on held-out samples over the noise's rms, in the worst channel; NaN where it is not known. stage:
+        "before", "retuned" or "after"."""
         return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))
 
     @property
@@ -87,10 +92,12 @@ class LawOutcome:
 
     @property
     def close(self) -> bool:
+        """Whether `laws` are the concealed function, within `CLOSE` over the visited range."""
         return bool(self.laws) and bool(self.errors) and self.errors[0] <= CLOSE
 
     @property
     def close_louder(self) -> bool:
+        """Whether `laws` are the concealed function, within `CLOSE` at a higher level than recorded."""
         return bool(self.laws) and len(self.errors) > 1 and self.errors[1] <= CLOSE
 
     @property
@@ -100,10 +107,13 @@ class LawOutcome:
 
     @property
     def false_law(self) -> bool:
+        """Whether a law is named where none was concealed."""
         return self.truth is None and bool(self.named)
 
     @property
     def missed(self) -> bool:
+        """Whether the answer is wrong: the diagnosis failed, named a false law, explained wrongly, or returned a law
+        that shows with another structure or function, or not at all."""
         if self.diagnosis is None or self.false_law or self.wrongly_explained:
             return True
         return self.truth is not None and self.shows and not (self.structured and self.close)

@@ -1,4 +1,4 @@
-"""Score of a bank of laws: the figures of issue 16, each with its interval."""
+"""Score of a bank of laws: shares of right and wrong answers, each with its interval."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

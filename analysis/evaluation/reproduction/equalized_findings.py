@@ -35,10 +35,12 @@ class EqualizedRows:
 
     @property
     def drawn(self) -> tuple[PlayedResponse, ...]:
+        """Rows drawn as figure 5."""
         return self.plain, self.equalized, self.edge, self.edge_blended
 
     @property
     def of_friction(self) -> tuple[PlayedResponse, ...]:
+        """Rows of the picture on friction: swept sine, all frequencies at once, device without friction."""
         return self.equalized, self.broad, self.frictionless
 
     @property

@@ -23,6 +23,7 @@ class Stage:
 
     @property
     def handle(self) -> Line2D:
+        """A line without data in this style, for a legend."""
         return Line2D([], [], color=self.colour, linestyle=self.dash, linewidth=self.width, label=self.words)
 
 

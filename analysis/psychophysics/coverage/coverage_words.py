@@ -23,7 +23,7 @@ ONLY_BELOW = ("run", "single")
 
 @dataclass(frozen=True, slots=True)
 class MeasuredCoverage:
-    """Simulated: ten people (single: one), published staircase, cap of 3 N."""
+    """Coverage of an interval in simulated studies: ten people (single: one), published staircase, cap of 3 N."""
 
     analysis: str
     frequency_hz: float
@@ -36,6 +36,7 @@ class MeasuredCoverage:
 
     @property
     def percent(self) -> str:
+        """Share of `covered` in per cent with Wilson's 95 % interval, such as: 94.0 % (92.4 to 95.3)."""
         lower, upper = wilson_interval(self.covered, self.intervals)
         share = 100 * self.covered / self.intervals
         return f"{number(share, 1)} % ({number(100 * lower, 1)} to {number(100 * upper, 1)})"

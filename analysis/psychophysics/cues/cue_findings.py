@@ -42,10 +42,11 @@ class CueFinding:
     """Participants for whom it is shown that a usual judge would notice the difference."""
     answers: AnswersOnDelivery
     p_holm: float | None
-    """p-value of `answers`, corrected for all cues and frequencies."""
+    """p-value of `answers`, corrected for all cues and frequencies (Holm); None where they could not be tested."""
 
     @property
     def followed(self) -> bool:
+        """Whether answers followed the cue, at `LEVEL` after the correction; False where that could not be tested."""
         return self.p_holm is not None and self.p_holm < LEVEL
 
 

@@ -34,10 +34,12 @@ class Answers:
 
     @property
     def trials(self) -> int:
+        """Number of answers in all cells."""
         return int(self.right.sum() + self.wrong.sum())
 
     @property
     def person(self) -> NDArray[np.intp]:
+        """(m,): index of each cell's person in `subjects`."""
         return self.run // len(self.frequencies_hz)
 
 

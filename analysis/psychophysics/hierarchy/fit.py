@@ -41,10 +41,12 @@ class HierarchicalFit:
 
     @property
     def means_db(self) -> FloatArray:
+        """(k,): median participant's threshold at each frequency, in the unit of `Answers.level_db`."""
         return self.parameters[: self.layout.k]
 
     @property
     def lapse(self) -> float:
+        """Lapse rate common to all persons, 0 to 1."""
         return float(expit(self.parameters[self.layout.lapse]))
 
 

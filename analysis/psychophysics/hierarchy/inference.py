@@ -45,6 +45,7 @@ class MedianThreshold:
 
     @property
     def newton(self) -> float:
+        """The estimate in N."""
         return float(10.0 ** (self.db / 20.0))
 
     @property

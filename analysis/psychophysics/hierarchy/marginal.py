@@ -44,18 +44,22 @@ class Layout:
 
     @property
     def size(self) -> int:
+        """Number of parameters."""
         return self.k + 6
 
     @property
     def log_sds(self) -> list[int]:
+        """Log standard deviations: of persons, of person x frequency, of log-slopes, of criteria."""
         return [self.k, self.k + 1, self.k + 3, self.k + 4]
 
     @property
     def slope(self) -> int:
+        """The mean log-slope."""
         return self.k + 2
 
     @property
     def lapse(self) -> int:
+        """The logit of the lapse rate."""
         return self.k + 5
 
 

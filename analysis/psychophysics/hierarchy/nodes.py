@@ -73,9 +73,10 @@ class Nodes:
 
 @dataclass(frozen=True, slots=True)
 class Population:
-    """The parameters of a `Layout`, by name."""
+    """The parameters of a `Layout`, by name: standard deviations and lapse rate themselves, the slope as logarithm."""
 
     means: FloatArray
+    """(k,), dB"""
     shared_sd: float
     own_sd: float
     slope: float
@@ -85,6 +86,7 @@ class Population:
 
     @staticmethod
     def of(parameters: FloatArray, k: int) -> "Population":
+        """From parameters (k + 6,): standard deviations and lapse rate no longer as logarithms and logit."""
         shared, own, slope_sd, criterion_sd = (math.exp(parameters[k + place]) for place in (0, 1, 3, 4))
         lapse = float(expit(parameters[k + 5]))
         return Population(parameters[:k], shared, own, float(parameters[k + 2]), slope_sd, criterion_sd, lapse)

@@ -68,6 +68,7 @@ class Objective:
         return float(value + prior.spread * parameters[layout.log_sds].sum()), slope
 
     def penalty_hessian(self, parameters: FloatArray) -> FloatArray:
+        """(size, size): Hessian of the log density of the prior, which is diagonal."""
         layout, prior = self.layout, self.prior
         lapse = float(expit(parameters[layout.lapse]))
         bent = np.zeros(layout.size)
@@ -77,6 +78,7 @@ class Objective:
 
     @property
     def bounds(self) -> list[tuple[float | None, float | None]]:
+        """Lower and upper bound of each parameter, None = unbounded; a new list, which the caller may change."""
         bounds: list[tuple[float | None, float | None]] = [(None, None)] * self.layout.size
         for place, both in zip(self.layout.log_sds, LOG_SD_BOUNDS, strict=True):
             bounds[place] = both

@@ -21,13 +21,20 @@ class FittedCurves(Protocol):
     """What a figure needs of a fit, of a study or of a single person."""
 
     @property
-    def frequencies_hz(self) -> tuple[float, ...]: ...
+    def frequencies_hz(self) -> tuple[float, ...]:
+        """Frequencies with answers, ascending."""
+
     @property
-    def persons(self) -> tuple[PersonEstimate, ...]: ...
+    def persons(self) -> tuple[PersonEstimate, ...]:
+        """Estimates of each person, in the order of `Answers.subjects`."""
+
     @property
-    def lapse(self) -> float: ...
+    def lapse(self) -> float:
+        """Lapse rate common to all persons, 0 to 1."""
+
     @property
-    def family(self) -> Family: ...
+    def family(self) -> Family:
+        """Family of the psychometric functions."""
 
 
 @dataclass(frozen=True, slots=True)
