@@ -57,8 +57,8 @@ class RunLikelihood:
     trials: int
     """All runs of the person at this frequency together."""
     db: float | None
-    """None where the most probable threshold is above the cap: then lower_db is a one-sided bound. None, too, where
-    `below` is True: then upper_db is one."""
+    """None where the most probable threshold is above the cap: then `lower_db` is a one-sided bound. None, too, where
+    `below` is True: then `upper_db` is a one-sided bound."""
     lower_db: float | None
     """None: no lower end within 30 dB below the levels played."""
     upper_db: float | None
