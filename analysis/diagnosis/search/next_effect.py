@@ -47,28 +47,50 @@ def find_next_effect(
     """The candidates for one more effect beside those of `base`, the best first."""
     step.at(0.0)
     evidence = gather_evidence(context.measure, context.tuning, base)[0]
+    fits = find_first_fits(context, catalogue, base, evidence, step)
+    step.at(0.6)
+    return compare_plausible(context, base, fits, evidence)
+
+
+def find_first_fits(
+    context: SearchContext,
+    catalogue: Sequence[Effect],
+    base: Fitted,
+    evidence: Evidence,
+    step: Step,
+    sites: tuple[int, ...] = (),
+) -> list[Fitted]:
+    """First fits of one more effect beside those of `base`, the best first. sites: places at which it must act; empty
+    where it may act at any."""
     told = [effect for effect in catalogue if context.measure.can_observe(effect)]
+
+    def suggest(effects: Sequence[Effect], evidence: Evidence) -> list[Hypothesis]:
+        suggested = _suggest_hypotheses(context, base.hypothesis, effects, evidence)
+        return [each for each in suggested if not sites or each.claims[0].sites == sites]
+
     short_form = short_recordings_of(context, base)
     if short_form is None:
-        suggested = _suggest_hypotheses(context, base.hypothesis, told, evidence)
+        suggested = suggest(told, evidence)
         known = sensitivity_at(context, base.deviations, base.hypothesis, with_forces=True)
         step.at(0.2)
         each = context.guard.over(context.map_, SCREENING)
         screened = screen(context.measure, context.tuning, base, known, suggested, each)
-        fits = first_fits(context, base, known, screened)
-    else:
-        timeless = _suggest_hypotheses(
-            context, base.hypothesis, [effect for effect in told if not effect.of_time], short_form.of(evidence)
-        )
-        timed = _suggest_hypotheses(context, base.hypothesis, [effect for effect in told if effect.of_time], evidence)
-        step.at(0.2)
-        fits = fits_on_short_recordings(context, short_form, base, timeless, timed)
-    step.at(0.6)
-    fitted_candidates = compare_candidates(context, base, fits)
+        return list(first_fits(context, base, known, screened))
+    timeless = suggest([effect for effect in told if not effect.of_time], short_form.of(evidence))
+    timed = suggest([effect for effect in told if effect.of_time], evidence)
+    step.at(0.2)
+    return fits_on_short_recordings(context, short_form, base, timeless, timed)
+
+
+def compare_plausible(
+    context: SearchContext, base: Fitted, fits: Sequence[Fitted], evidence: Evidence
+) -> tuple[FittedCandidate, ...]:
+    """The candidates of these first fits, the preferred one first, without those that predict nothing beyond `base` or
+    hold what the data never visit."""
     return plainest_first(
         [
             candidate
-            for candidate in fitted_candidates
+            for candidate in compare_candidates(context, base, fits)
             if not predicts_nothing(context.measure, base, candidate.fitted)
             and within_data(candidate.fitted.hypothesis, evidence)
         ]

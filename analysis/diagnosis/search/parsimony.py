@@ -20,6 +20,7 @@ from analysis.diagnosis.settings import (
     REFINED_MOST_GAIN,
     REFINED_SHARE,
 )
+from equalizer.effects.effect import Effect
 
 DRY_FRICTION = frozenset(
     {
@@ -48,6 +49,12 @@ def excludes(held: Claim, other: Claim) -> bool:
         return False
     names = {held.effect.name, other.effect.name}
     return len(names) == 1 or any(names <= family for family in FAMILIES)
+
+
+def relatives(name: str, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The effects that may stand in for the named one, itself among them: its family, and what refines it."""
+    families = {name}.union(*(family for family in FAMILIES if name in family))
+    return tuple(effect for effect in catalogue if effect.name in families or name in effect.simpler)
 
 
 def plainest_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[FittedCandidate, ...]:

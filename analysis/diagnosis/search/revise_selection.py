@@ -6,15 +6,21 @@ the second is looked for again beside it, as often as there are effects (Miller,
 ch. 3).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
-from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.next_effect import Step, find_next_effect
-from analysis.diagnosis.search.parsimony import is_worthwhile
+from analysis.diagnosis.search.next_effect import (
+    Step,
+    compare_plausible,
+    find_first_fits,
+    find_next_effect,
+)
+from analysis.diagnosis.search.parsimony import is_worthwhile, relatives
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
 from analysis.diagnosis.settings import SEARCH_ON
@@ -53,28 +59,39 @@ def exchange_effects(
     for _ in found.steps:
         if not _may_exchange(context, found, time_left):
             break
-        better = _exchange_first(limited, found, catalogue, progress)
+        better = _exchange_first(limited, found, partial(_find_first_again, limited, found, catalogue, progress))
         if better is None:
             break
         found = better
     return found
 
 
-def exchange_for_refinement(
+def _find_first_again(
+    context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress
+) -> tuple[FittedCandidate, ...]:
+    kept = without_effect(context, found, 0)
+    return find_next_effect(context, catalogue, kept.steps[-1].fitted, _again(progress))
+
+
+def exchange_for_relatives(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
-    """The explanation with its first effect exchanged for a refinement of the same law at the same place: what this
-    adds may be seen only beside the second effect, and is far fewer fits than the whole catalogue. The law itself is
-    among those that are tried, so that a refinement must gain as much as in any step."""
-    first = found.steps[0].newest if found.steps else ""
-    refinements = [effect for effect in catalogue if first in effect.simpler]
-    if not refinements or not _may_exchange(context, found, time_left):
+    """The explanation with its first effect exchanged for one of its family, or a refinement, at the same place: which
+    of them it is may be seen only beside the second effect. They start from the whole explanation without the first
+    effect, not fitted anew, and only what then leaves less than the first effect does is fitted on."""
+    tried = relatives(found.steps[0].newest, catalogue) if found.steps else ()
+    if not tried or not _may_exchange(context, found, time_left):
         return found
-    limited = replace(context, map_=limit_map(context.map_, time_left))
-    tried = [*refinements, *(effect for effect in catalogue if effect.name == first)]
-    better = _exchange_first(limited, found, tried, progress)
+    limited, last = replace(context, map_=limit_map(context.map_, time_left)), found.steps[-1]
     sites = found.steps[0].fitted.hypothesis.claims[-1].sites
-    return found if better is None or better.steps[-1].fitted.hypothesis.claims[-1].sites != sites else better
+
+    def compare() -> tuple[FittedCandidate, ...]:
+        base = _without(limited, last, 0).fitted
+        evidence = gather_evidence(limited.measure, limited.tuning, base)[0]
+        fits = find_first_fits(limited, tried, base, evidence, _again(progress), sites)
+        return compare_plausible(limited, base, [law for law in fits if law.cost < last.fitted.cost], evidence)
+
+    return _exchange_first(context, found, compare) or found
 
 
 def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBudget) -> bool:
@@ -84,26 +101,27 @@ def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBud
     return not fixed and more and time_left()
 
 
-def _exchange_first(
-    context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress
-) -> Explanation | None:
-    """The explanation with its first effect replaced by what fits better beside the others; None where nothing does."""
-    step = Step("looking again for the first effect", 0.8, progress)
+def _again(progress: Progress) -> Step:
+    return Step("looking again for the first effect", 0.8, progress)
 
-    def find() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
+
+def _exchange_first(
+    context: SearchContext, found: Explanation, compare: Callable[[], tuple[FittedCandidate, ...]]
+) -> Explanation | None:
+    """The explanation with its first effect replaced by what fits better beside the others; None where nothing does.
+    compare: the candidates in its place, the preferred one first."""
+
+    def find() -> Explanation | None:
         try:
+            tried = compare()
+            named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
+            if not named or named[0] is not tried[0] or not is_worthwhile(found.steps[-1], named[0]):
+                return None
             kept = without_effect(context, found, 0)
-            return kept, find_next_effect(context, catalogue, kept.steps[-1].fitted, step)
         except OutOfTimeError:
             return None
+        # What was compared with the former first effect are no rivals of the one that is first now.
+        rounds = (kept.rounds[0][:1], *kept.rounds[1 : len(kept.steps)], named)
+        return replace(kept, after=context.with_test_score(named[0]), rounds=rounds, steps=(*kept.steps, named[0]))
 
-    looked = context.guard.part(found.steps[-1].newest, "its exchange", find, None)
-    if looked is None:
-        return None
-    kept, tried = looked
-    named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
-    if not named or named[0] is not tried[0] or not is_worthwhile(found.steps[-1], named[0]):
-        return None
-    # What was compared with the former first effect are no rivals of the one that is first now.
-    rounds = (kept.rounds[0][:1], *kept.rounds[1 : len(kept.steps)], named)
-    return replace(kept, after=context.with_test_score(named[0]), rounds=rounds, steps=(*kept.steps, named[0]))
+    return context.guard.part(found.steps[-1].newest, "its exchange", find, None)

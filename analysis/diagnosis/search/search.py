@@ -34,7 +34,7 @@ from analysis.diagnosis.search.explain import Explanation, add_effects, begin, e
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
 from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_far_less
-from analysis.diagnosis.search.revise_selection import exchange_effects, exchange_for_refinement, without_effect
+from analysis.diagnosis.search.revise_selection import exchange_effects, exchange_for_relatives, without_effect
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, shows_there_alone
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
@@ -196,7 +196,7 @@ def _search_with_pairs(
     """The search that goes on from a first effect, where that leaves enough. alone: the explanation by it."""
     # With an effect left out, a round that brought none may not be taken up again.
     found = add_effects(context, catalogue, alone, progress, time_left, MOST_EFFECTS if context.barred else 2)
-    found = exchange_for_refinement(context, found, catalogue, progress, time_left)
+    found = exchange_for_relatives(context, found, catalogue, progress, time_left)
     found = add_effects(context, catalogue, found, progress, time_left)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     judged = _judge_with_prediction(context, found)

@@ -8,7 +8,7 @@ from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_c
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retune_alone
-from analysis.diagnosis.search.revise_selection import exchange_effects, exchange_for_refinement
+from analysis.diagnosis.search.revise_selection import exchange_effects, exchange_for_relatives
 from analysis.diagnosis.search.search import _drop_negligible, prune
 from analysis.diagnosis.search.time_budget import CountedBudget, always
 from analysis.diagnosis.settings import SEARCH_ON
@@ -110,7 +110,7 @@ def test_a_plain_law_is_exchanged_for_its_refinement_beside_the_second(rubbing_a
     plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
     assert plain.after.score.worst_channel > SEARCH_ON
     everything = list(EFFECTS.values())
-    found = exchange_for_refinement(rubbing_and_late, plain, everything, quiet, always)
+    found = exchange_for_relatives(rubbing_and_late, plain, everything, quiet, always)
     assert names(found) == ["asymmetric_friction", "sensor_lag"]
     assert found.after.score.worst_channel < SEARCH_ON
     rubs = {"coulomb_friction", *(e.name for e in everything if "coulomb_friction" in e.simpler)}
@@ -123,7 +123,7 @@ def test_a_refinement_that_adds_little_takes_no_place(arena_of):
     # The second effect is not the right one: what it leaves, a refinement of the first takes up in part.
     found = found_of(context, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
     assert found.after.score.worst_channel > SEARCH_ON
-    assert exchange_for_refinement(context, found, list(EFFECTS.values()), quiet, always) is found
+    assert exchange_for_relatives(context, found, list(EFFECTS.values()), quiet, always) is found
 
 
 def test_a_refinement_elsewhere_takes_no_place(rubbing_and_late, monkeypatch):
@@ -138,13 +138,13 @@ def test_a_refinement_elsewhere_takes_no_place(rubbing_and_late, monkeypatch):
         steps=(plain.steps[0], replace(plain.steps[1], fitted=replace(plain.steps[1].fitted, hypothesis=elsewhere))),
     )
     monkeypatch.setattr(revised, "_exchange_first", lambda *asked: moved)
-    assert exchange_for_refinement(rubbing_and_late, plain, list(EFFECTS.values()), quiet, always) is plain
+    assert exchange_for_relatives(rubbing_and_late, plain, list(EFFECTS.values()), quiet, always) is plain
 
 
 def test_a_law_without_refinements_stays(rubbing_and_late):
     plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
     none = [EFFECTS[name] for name in ("viscous_damping", "sensor_lag")]
-    assert exchange_for_refinement(rubbing_and_late, plain, none, quiet, always) is plain
+    assert exchange_for_relatives(rubbing_and_late, plain, none, quiet, always) is plain
 
 
 def test_of_three_the_one_that_stood_in_is_dropped(limited_and_late):
