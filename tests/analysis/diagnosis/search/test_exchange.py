@@ -94,19 +94,20 @@ def test_an_effect_that_is_not_to_be_named_takes_no_place(limited_and_late, comp
 @pytest.fixture(scope="module")
 def rubbing_and_late(arena_of):
     rubs = PlacedEffect(EFFECTS["asymmetric_friction"], (0,), {"level_positive": 0.05, "level_negative": 0.12})
-    return arena_of((rubs, PlacedEffect(EFFECTS["sensor_lag"], (0,), {"bandwidth": LAG_HZ})))
+    return arena_of((rubs, PlacedEffect(EFFECTS["sensor_lag"], (0,), {"bandwidth": LAG_HZ})), axes=2)
 
 
 def test_a_plain_law_is_exchanged_for_its_refinement_beside_the_second(rubbing_and_late, monkeypatch):
     import analysis.diagnosis.search.revise_selection as revised
 
-    tried, find = [], revised.find_next_effect
+    tried, fits, find = [], [], revised.find_first_fits
 
-    def find_and_note(context, catalogue, base, step):
+    def find_and_note(context, catalogue, base, evidence, step, sites):
         tried.append({effect.name for effect in catalogue})
-        return find(context, catalogue, base, step)
+        fits.extend(found := find(context, catalogue, base, evidence, step, sites))
+        return found
 
-    monkeypatch.setattr(revised, "find_next_effect", find_and_note)
+    monkeypatch.setattr(revised, "find_first_fits", find_and_note)
     plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
     assert plain.after.score.worst_channel > SEARCH_ON
     everything = list(EFFECTS.values())
@@ -114,7 +115,9 @@ def test_a_plain_law_is_exchanged_for_its_refinement_beside_the_second(rubbing_a
     assert names(found) == ["asymmetric_friction", "sensor_lag"]
     assert found.after.score.worst_channel < SEARCH_ON
     rubs = {"coulomb_friction", *(e.name for e in everything if "coulomb_friction" in e.simpler)}
-    assert all(each <= rubs for each in tried)
+    assert tried == [rubs]
+    # Only at the place of the law that they replace.
+    assert {law.hypothesis.claims[-1].sites for law in fits} == {(0,)}
 
 
 def test_a_refinement_that_adds_little_takes_no_place(arena_of):
@@ -126,19 +129,12 @@ def test_a_refinement_that_adds_little_takes_no_place(arena_of):
     assert exchange_for_relatives(context, found, list(EFFECTS.values()), quiet, always) is found
 
 
-def test_a_refinement_elsewhere_takes_no_place(rubbing_and_late, monkeypatch):
-    import analysis.diagnosis.search.revise_selection as revised
-
-    plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
-    elsewhere = hypothesis_of_claim(
-        Claim(EFFECTS["asymmetric_friction"], "one", (1,)), [{"level_positive": 0.05, "level_negative": 0.12}]
-    )
-    moved = replace(
-        plain,
-        steps=(plain.steps[0], replace(plain.steps[1], fitted=replace(plain.steps[1].fitted, hypothesis=elsewhere))),
-    )
-    monkeypatch.setattr(revised, "_exchange_first", lambda *asked: moved)
-    assert exchange_for_relatives(rubbing_and_late, plain, list(EFFECTS.values()), quiet, always) is plain
+def test_another_law_of_the_family_takes_the_place_of_one_that_it_does_not_refine(rubbing_and_late):
+    at_rest = claim("stribeck_friction", coulomb=0.07, static=0.09, speed=0.01)
+    sticking = found_of(rubbing_and_late, at_rest, claim("sensor_lag", bandwidth=LAG_HZ))
+    found = exchange_for_relatives(rubbing_and_late, sticking, list(EFFECTS.values()), quiet, always)
+    assert names(found) == ["asymmetric_friction", "sensor_lag"]
+    assert found.after.score.worst_channel < SEARCH_ON
 
 
 def test_a_law_without_refinements_stays(rubbing_and_late):
