@@ -102,7 +102,7 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
             before, fits = fits[0].cost, list(context.map_(continue_fit, fits))  # type: ignore[arg-type]
         except OutOfTimeError:
             break  # fits that are not polished are results all the same
-        if fits[0].cost > before * (1 - POLISHED):
+        if fits[0].cost > before * (1 - max(POLISHED, _least_gain(fits[0]))):
             break
     return fits
 
