@@ -29,13 +29,14 @@ from equalizer.effects.effect import Effect
 
 
 def without_effect(context: SearchContext, found: Explanation, number: int) -> Explanation:
-    """The explanation without one effect; those after it are refitted. number: of the effect, in the order in which
-    they were found; without the only one, the re-tuned model is left."""
+    """The explanation without one effect; the others are refitted from where they are beside it, which for the last may
+    be a better minimum than they had before. number: of the effect, in the order in which they were found; without the
+    only one, the re-tuned model is left."""
     if len(found.steps) == 1:
         return replace(found, after=found.retuned, steps=())
     earlier, later = found.steps[:number], list(found.steps[number + 1 :])
     if not later:
-        return replace(found, after=context.with_test_score(earlier[-1]), rounds=found.rounds[:number], steps=earlier)
+        return _without_last(context, found)
     alone = [_without(context, candidate, number) for candidate in later]
     alone[-1] = context.candidate(refine(context, alone[-1].fitted))
     # Beside effects that follow, rivals of this one were not compared.
@@ -43,6 +44,15 @@ def without_effect(context: SearchContext, found: Explanation, number: int) -> E
     others = [candidate for candidate in rivals if candidate.newest != alone[0].newest]
     rounds = (*found.rounds[:number], (alone[0], *others), *found.rounds[number + 2 :])
     return replace(found, after=context.with_test_score(alone[-1]), rounds=rounds, steps=(*earlier, *alone))
+
+
+def _without_last(context: SearchContext, found: Explanation) -> Explanation:
+    """The explanation as it was before its last effect, or refitted from where that has led."""
+    before, last = found.steps[-2], len(found.steps) - 1
+    freed = context.candidate(refine(context, _without(context, found.steps[-1], last).fitted))
+    kept = freed if freed.fitted.cost < before.fitted.cost else before
+    rounds = (*found.rounds[: last - 1], (kept, *found.rounds[last - 1][1:]))
+    return replace(found, after=context.with_test_score(kept), rounds=rounds, steps=(*found.steps[: last - 1], kept))
 
 
 def _without(context: SearchContext, candidate: FittedCandidate, number: int) -> FittedCandidate:

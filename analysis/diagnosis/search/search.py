@@ -3,8 +3,8 @@
 Theory of operation.
 
 1. `add_effects` selects effects forward, on the samples to fit and to choose by.
-2. Backward elimination (`prune`) removes what selection added and the result does not need: the earlier of two effects,
-   where the later alone fits as well; effects that take too little of the mismatch; effects whose parameters the data
+2. Backward elimination (`prune`) removes what selection added and the result does not need: effects without which the
+   others, refitted, fit as well; effects that take too little of the mismatch; effects whose parameters the data
    do not determine (`identifiability`: the interval of the only amplitude, or its profile likelihood, contains zero).
 3. `verdict.judge` compares the held-out errors, in units of the noise, with limits: on samples that neither fitted nor
    chose anything, a wrong explanation has no advantage over a right one.
@@ -59,22 +59,22 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
     if found.statistic is not None or context.certain:
         return found
     if len(found.steps) > 1:
-        found = _drop_former(context, found, time_left)
+        found = _drop_needless(context, found, time_left)
     if context.references is None:
         found = _drop_negligible(context, found)
     return keep_identifiable(context, found, time_left)
 
 
-def _drop_former(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """Drop the first of the earlier effects without which the others fit as well: it may have stood in for a later
-    one."""
-    for number in range(len(found.steps) - 1):
+def _drop_needless(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+    """Drop the first of the effects without which the others fit as well: an earlier one may have stood in for a later
+    one, and the last may have led the others out of a local minimum."""
+    for number in range(len(found.steps)):
         if not time_left():
             break
         others = without_effect(context, found, number)
         fits = np.isfinite(others.steps[-1].fitted.cost)
         if fits and not is_worthwhile(others.steps[-1], found.steps[-1]):
-            return others if len(others.steps) < 2 else _drop_former(context, others, time_left)
+            return others if len(others.steps) < 2 else _drop_needless(context, others, time_left)
     return found
 
 
