@@ -30,7 +30,7 @@ from analysis.diagnosis.errors.hypothesis import NOTHING, Hypothesis, combine
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.next_effect import Step, find_next_effect
-from analysis.diagnosis.search.parsimony import excess, inseparable, is_worthwhile
+from analysis.diagnosis.search.parsimony import excess, inseparable, is_worthwhile, leaves_little
 from analysis.diagnosis.search.search_context import (
     FittedCandidate,
     SearchContext,
@@ -176,8 +176,11 @@ def _evaluate_again(context: SearchContext, scored: FittedCandidate) -> Fitted:
 
 
 def is_worth_searching(context: SearchContext, found: Explanation, base: FittedCandidate) -> bool:
-    """Whether `base`, the last step of `found`, leaves enough error to look for one more effect."""
+    """Whether `base`, the last step of `found`, leaves enough error to look for one more effect. A third is not looked
+    for where two fit as well as laws of a real device do: it would take up what these leave."""
     if base.fitted.hypothesis.claims:
+        if len(base.fitted.hypothesis.claims) > 1 and context.references is None and leaves_little(found.retuned, base):
+            return False
         beyond = 1.0 if context.references is None else context.references.beyond
         return base.score.worst_channel > SEARCH_ON * beyond
     surprised = bool(np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)

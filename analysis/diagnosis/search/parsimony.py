@@ -12,6 +12,9 @@ from analysis.diagnosis.settings import (
     ADDED_SHARE,
     AS_GOOD_GAIN,
     AS_GOOD_SHARE,
+    CONVINCING_ERROR,
+    CONVINCING_SHARE,
+    EXPLAINED_ERROR,
     LAW_BEATS,
     NOISE_ALONE,
     NOISE_KNOWN_TO,
@@ -93,6 +96,21 @@ def both_stand(named: FittedCandidate, other: FittedCandidate) -> bool:
 def excess(candidate: FittedCandidate) -> float:
     """Mean log error power above the noise."""
     return max(candidate.score.mean_log_error - NOISE_KNOWN_TO, 0.0)
+
+
+def share_of_mismatch(without: FittedCandidate, with_it: FittedCandidate) -> float:
+    """Relative decrease of the excess log error power over the noise, between 0 and 1."""
+    whole = excess(without)
+    return min(max(1 - excess(with_it) / whole, 0.0), 1.0) if whole > 0 else 0.0
+
+
+def leaves_little(retuned: FittedCandidate, candidate: FittedCandidate) -> bool:
+    """Whether a candidate leaves little more than noise: as much as the right laws leave of a real device, which none
+    fits exactly. retuned: the model without effects."""
+    worst = candidate.score.worst_channel
+    if worst <= EXPLAINED_ERROR:
+        return True
+    return worst <= CONVINCING_ERROR and share_of_mismatch(retuned, candidate) >= CONVINCING_SHARE
 
 
 def inseparable(best: FittedCandidate, other: FittedCandidate) -> bool:

@@ -20,7 +20,7 @@ from analysis.diagnosis.search.next_effect import (
     find_first_fits,
     find_next_effect,
 )
-from analysis.diagnosis.search.parsimony import is_worthwhile, relatives
+from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little, relatives
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
 from analysis.diagnosis.settings import SEARCH_ON
@@ -63,11 +63,11 @@ def _without(context: SearchContext, candidate: FittedCandidate, number: int) ->
 def exchange_effects(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
-    """The explanation with effects exchanged; unchanged where it reaches the noise, has a single effect, nothing fits
-    better, or a law crashes."""
+    """The explanation with effects exchanged; unchanged where it leaves as little as laws of a real device do, has a
+    single effect, nothing fits better, or a law crashes."""
     limited = replace(context, map_=limit_map(context.map_, time_left))
     for _ in found.steps:
-        if not _may_exchange(context, found, time_left):
+        if not _may_exchange(context, found, time_left) or leaves_little(found.retuned, found.after):
             break
         better = _exchange_first(limited, found, partial(_find_first_again, limited, found, catalogue, progress))
         if better is None:

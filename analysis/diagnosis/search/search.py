@@ -67,22 +67,22 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
 
 def _drop_needless(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
     """Drop the first of the effects without which the others fit as well: an earlier one may have stood in for a later
-    one, and the last may have led the others out of a local minimum."""
+    one, and the last may have led the others out of a local minimum. Of three, also one without which two fit as well
+    as laws of a real device do: none is exact, and a third takes up what they leave."""
     for number in range(len(found.steps)):
         if not time_left():
             break
         others = without_effect(context, found, number)
-        fits = np.isfinite(others.steps[-1].fitted.cost)
-        if fits and not is_worthwhile(others.steps[-1], found.steps[-1]):
+        if not np.isfinite(others.steps[-1].fitted.cost):
+            continue
+        needless = not is_worthwhile(others.steps[-1], found.steps[-1])
+        if needless or (len(others.steps) > 1 and as_good_as_noise(others)):
             return others if len(others.steps) < 2 else _drop_needless(context, others, time_left)
     return found
 
 
 def _drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
-    """Drop last effects that take little and leave more than noise; and a third one where two already fit as well as
-    laws of a real device do: none is exact, and a third takes up what they leave."""
-    while len(found.steps) > 2 and as_good_as_noise(two := without_effect(context, found, len(found.steps) - 1)):
-        found = two
+    """Drop last effects that take little and leave more than noise."""
     while len(found.steps) > 1 and not as_good_as_noise(found):
         if shares_taken(found.retuned, found.steps)[-1] >= LAST_EFFECT_SHARE:
             break
@@ -249,9 +249,11 @@ def _find_with_opened(
 
 def _adds_confirmed(first: SearchResult, opened: SearchResult) -> bool:
     """Whether a search with opened samples names all that the first did, and more, which what is still held out
-    confirms."""
+    confirms; or leaves little with a part of that, where the first had taken up too much."""
     before, found = first.found.after if first.judgement.named else first.found.retuned, opened.found
-    if not opened.judgement.named or not _sites(before) < _sites(found.after):
+    known, named = _sites(before), _sites(found.after)
+    instead = as_good_as_noise(found) and known & named
+    if not opened.judgement.named or not named - known or not (known <= named or instead):
         return False
     if not first.judgement.named:
         return True

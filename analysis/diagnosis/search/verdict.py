@@ -8,14 +8,11 @@ import numpy as np
 
 from analysis.diagnosis.document import Verdict
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import excess
+from analysis.diagnosis.search.parsimony import leaves_little, share_of_mismatch
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import (
     CONFIRMED_SHARE,
-    CONVINCING_ERROR,
-    CONVINCING_SHARE,
     EXPLAINED_BY_CHANCE,
-    EXPLAINED_ERROR,
     HELD_OUT_ALONE_ERROR,
     HELD_OUT_ERROR,
     HELD_OUT_TOO_SMALL,
@@ -52,10 +49,7 @@ def judge(found: Explanation) -> Judgement:
 
 def as_good_as_noise(found: Explanation) -> bool:
     """Whether little more than noise is left, on the samples to fit and to choose by."""
-    worst = found.after.score.worst_channel
-    if worst <= EXPLAINED_ERROR:
-        return True
-    return worst <= CONVINCING_ERROR and share_of_mismatch(found.retuned, found.after) >= CONVINCING_SHARE
+    return leaves_little(found.retuned, found.after)
 
 
 def worth_naming(found: Explanation) -> bool:
@@ -80,12 +74,6 @@ def confirms_addition(without: FittedCandidate, with_it: FittedCandidate) -> boo
         return False
     left = float(np.max(with_it.score.test))
     return float(np.log(worst) - np.log(left)) >= CONFIRMED_SHARE * float(np.log(worst))
-
-
-def share_of_mismatch(without: FittedCandidate, with_it: FittedCandidate) -> float:
-    """Relative decrease of the excess log error power over the noise, between 0 and 1."""
-    whole = excess(without)
-    return min(max(1 - excess(with_it) / whole, 0.0), 1.0) if whole > 0 else 0.0
 
 
 def shares_taken(without: FittedCandidate, steps: Sequence[FittedCandidate]) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.revise_selection import exchange_effects, exchange_for_relatives
-from analysis.diagnosis.search.search import _drop_negligible, prune
+from analysis.diagnosis.search.search import _drop_needless, prune
 from analysis.diagnosis.search.time_budget import CountedBudget, always
 from analysis.diagnosis.settings import SEARCH_ON
 from equalizer.effects.catalogue import EFFECTS
@@ -174,5 +174,5 @@ def test_a_third_is_named_only_where_two_leave_more_than_laws_of_real_devices_do
     }
     order = [each for name, each in claims.items() if name != third]
     found = found_of(limited_and_late, *order, claims[third])
-    left = _drop_negligible(limited_and_late, found)
+    left = _drop_needless(limited_and_late, found, always)
     assert len(left.steps) == kept

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.verdict import confirms_addition, judge, share_of_mismatch, shares_taken
+from analysis.diagnosis.search.parsimony import share_of_mismatch
+from analysis.diagnosis.search.verdict import confirms_addition, judge, shares_taken
 
 RUBS = "coulomb_friction"
 
