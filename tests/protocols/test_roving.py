@@ -118,8 +118,3 @@ def test_shipped_studies_play_the_staircases_level(shipped):
 def test_a_level_roved_to_the_cap_but_for_rounding_is_taken(small_text):
     level_n = 3.0 * 10 ** (-6.0 / 40) * (1 + 1e-12)
     load_protocol(f"{small_text}\n[demo]\nlevel_n = {level_n!r}\nrove_db = 6.0\n", "mine.toml")
-
-
-def test_a_first_level_of_detection_is_refused_without_a_word_of_roving(small_text):
-    with pytest.raises(ProtocolError, match="detection.start_n is 2.5 N above staircase.cap_n"):
-        load_protocol(f"{roved(small_text, 0.0, 2.0)}\n[detection]\nfrequencies_hz = [25.0]\nstart_n = 2.5\n", "m")

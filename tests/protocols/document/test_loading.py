@@ -292,11 +292,3 @@ def test_nonsense_is_refused_in_words_and_never_crashes(values, kind):
     with pytest.raises(ProtocolError) as caught:
         protocol_from_values({**values, "kind": kind}, "nonsense")
     assert all(problem.key and problem.problem and problem.allowed for problem in caught.value.problems)
-
-
-def test_the_time_to_keep_that_is_allowed_is_taken(threshold_text):
-    """A period such as 1 / 0.7 s, rounded to the digits of the message, would be too short again."""
-    slow = changed(threshold_text, "[5.0, 15.0", "[0.7, 15.0")
-    allowed = refused(slow).allowed
-    assert allowed == "at least 1.4286 s"
-    assert load_protocol(changed(slow, "keep_s = 1.0", "keep_s = 1.4286"), "mine.toml").kind == "study"
