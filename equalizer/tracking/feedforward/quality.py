@@ -24,7 +24,7 @@ class Quality:
     """Largest angle between the wanted axis and the major axis of the delivered ellipse."""
 
 
-def quality(delivered: ComplexArray) -> Quality:
+def measure_quality(delivered: ComplexArray) -> Quality:
     """Flatness, coupling and direction error of an equalized response. delivered: T, (lines, p, p); column i is the
     response to axis i."""
     along = np.abs(np.einsum("lii->li", delivered))
