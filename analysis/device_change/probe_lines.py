@@ -27,8 +27,10 @@ hand."""
 TO_HZ = 150.0
 """Upper end of the lines that make up the position: above it, the handle hardly moves. By hand."""
 
-BREAK_AWAYS_M = (2e-6, 8e-6, 2e-5, 5e-5)
-"""Break-away lengths x0 of Dahl's law that are tried (m), from a stiff contact to a soft one. By hand."""
+BREAK_AWAYS_M = tuple(np.geomspace(2e-6, 5e-5, 8).tolist())
+"""Break-away lengths x0 of Dahl's law that are tried (m), from a stiff contact to a soft one. The level of friction is
+wrong in the direction in which the length is: with steps of a factor 1.6 by some 10 %, with steps of 2.5 by 40 %. By
+hand."""
 
 PASSES = 3
 """Periods computed until Dahl's force, which remembers its start, repeats: it forgets within a few break-away
