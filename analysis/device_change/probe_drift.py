@@ -20,9 +20,12 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+import numpy.typing as npt
 
-from analysis.device_change.probe_lines import ComplexArray, IntArray, ProbeLines, friction_shapes
-from equalizer.signals.signal import FloatArray
+from analysis.device_change.probe_lines import ProbeLines, friction_shapes
+from equalizer.signals.signal import ComplexArray, FloatArray
+
+IntArray = npt.NDArray[np.int64]
 
 AXES = "xyz"
 BASE_CYCLES = 2

@@ -1,8 +1,12 @@
-"""A probe's answer line by line: force and acceleration at the lines that drive each axis, and what lies between; and
-the force that dry friction would be along its motion.
+"""Spectra of a probe: force, acceleration and position at each spectral line, and the spectrum of the dry friction
+along the probe's motion.
 
-Friction is Dahl's law (P. R. Dahl, "A solid friction model", 1968), dF/dx = (1 - F sgn v) / x0 for a force of 1 N;
-without x0 it is Coulomb's sign of the velocity.
+Friction follows Dahl's law (P. R. Dahl, "A solid friction model", 1968) at a level of 1 N,
+
+    dF/dx = (1 - F sgn v) / x0,
+
+x0: break-away length; as x0 goes to 0, F is Coulomb's sgn v. Over a step of constant direction s = sgn v and length
+|dx| it has the exact solution F+ = s - (s - F) exp(-|dx| / x0), which is used here.
 """
 
 from dataclasses import dataclass
@@ -11,10 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
-
-ComplexArray = npt.NDArray[np.complex128]
-IntArray = npt.NDArray[np.int64]
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 DRIVEN_SHARE = 0.1
 """Least amplitude of a driven line, relative to an axis's strongest: weaker ones are due to rounding and the spring."""
@@ -24,10 +25,11 @@ FROM_HZ = 3.0
 hand."""
 
 TO_HZ = 150.0
-"""Upper end of the lines that make up the position: above it, it hardly moves. By hand."""
+"""Upper end of the lines that make up the position: above it, the handle hardly moves. By hand."""
 
-BREAK_AWAYS_M = (2e-6, 8e-6, 2e-5, 5e-5)
-"""Lengths over which friction builds up, from almost none to a soft one; the best-fitting one is taken. By
+BREAK_AWAYS_M = tuple(np.geomspace(2e-6, 5e-5, 8).tolist())
+"""Break-away lengths x0 of Dahl's law that are tried (m), from a stiff contact to a soft one. The level of friction is
+wrong in the direction in which the length is: with steps of a factor 1.6 by some 10 %, with steps of 2.5 by 40 %. By
 hand."""
 
 PASSES = 3
@@ -37,38 +39,39 @@ lengths."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProbeLines:
-    """Means over the whole periods of one probe. Spectra are amplitudes: a cosine of 1 N has 1 N."""
+    """Spectra of the mean period of one probe, as amplitudes: a cosine of 1 N has 1 N."""
 
     frequency_hz: FloatArray
-    """(lines,): of all lines, driven or not, without that of zero."""
+    """(lines,): all lines between zero and half the sample rate, driven or not."""
     driven: npt.NDArray[np.bool_]
-    """(lines, axes)"""
+    """(lines, axes): whether the probe's multisine drives the axis at the line."""
     force_n: ComplexArray
-    """(lines, axes): what was sent, spring and damper included."""
+    """(lines, axes): the command, virtual spring and damper included."""
     acceleration_mps2: ComplexArray
     """(lines, axes)"""
     position_m: ComplexArray
-    """(lines, axes): encoders; NaN where there are none."""
+    """(lines, axes): from the encoders; NaN where there are none."""
 
 
 def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
-    """Force and acceleration at the lines of a probe. Raises ValueError where less than a period was kept, or samples
-    are missing."""
+    """Spectra of the mean period of a probe, of its first segment where it has segments. Raises ValueError where less
+    than a period was kept, or samples are missing."""
     period = round(period_s * recording.sample_rate_hz)
-    decided = recording.command if recording.excitation is None else recording.excitation
-    first, last = 0, len(recording)
+    # With a virtual spring, the command also holds the spring's force, which would count as driven.
+    designed = recording.command if recording.excitation is None else recording.excitation
+    start, stop = 0, len(recording)
     if recording.segments:
-        first, last = recording.segments[0].start, recording.segments[0].stop
-    if last - first > 2 * period:  # the first of many periods holds the transient
-        first += period
+        start, stop = recording.segments[0].start, recording.segments[0].stop
+    if stop - start > 2 * period:  # the first of many periods holds the transient
+        start += period
     excitation, force, acceleration = (
-        _mean_spectrum(each.samples[first:last], period) for each in (decided, recording.command, recording.response)
+        _mean_spectrum(each.samples[start:stop], period) for each in (designed, recording.command, recording.response)
     )
     if not np.isfinite(force).all() or not np.isfinite(acceleration).all():
         raise ValueError("samples of it are missing")
     position = np.full(force.shape, np.nan, dtype=complex)
     if recording.position is not None and recording.position.samples.shape[1] == force.shape[1]:
-        position = _mean_spectrum(recording.position.samples[first:last], period)
+        position = _mean_spectrum(recording.position.samples[start:stop], period)
     size = np.abs(excitation)
     return ProbeLines(
         frequency_hz=np.arange(1, len(force) + 1) / period_s,
@@ -85,11 +88,11 @@ above."""
 
 
 def apparent_mass_kg(lines: ProbeLines) -> float:
-    """Median of the real part of force over acceleration along each driven axis, on `MASS_LINES_HZ`: a hand on the
-    handle adds to it. Raises ValueError where there is no such line, or what comes out is no mass."""
+    """Median of the real part of force over acceleration of the driven axis, over the driven lines in `MASS_LINES_HZ`:
+    a hand on the handle adds to it. Raises ValueError where there is no such line, or the median is not positive."""
     low_hz, high_hz = MASS_LINES_HZ
-    here = (lines.frequency_hz >= low_hz) & (lines.frequency_hz <= high_hz)
-    rows, axes = np.nonzero(lines.driven & here[:, None])
+    in_band = (lines.frequency_hz >= low_hz) & (lines.frequency_hz <= high_hz)
+    rows, axes = np.nonzero(lines.driven & in_band[:, None])
     if not len(rows):
         raise ValueError(f"it has no line between {low_hz:g} and {high_hz:g} Hz, which would tell the handle's mass")
     with np.errstate(divide="ignore", invalid="ignore"):  # of a dead sensor
@@ -100,37 +103,42 @@ def apparent_mass_kg(lines: ProbeLines) -> float:
 
 
 def _mean_spectrum(samples: FloatArray, period: int) -> ComplexArray:
-    """(lines, axes), without the line of zero and half the rate."""
-    whole = len(samples) // period
-    if not whole:
+    """(lines, axes): spectrum of the mean of the last whole periods, without the lines at zero and half the rate."""
+    periods = len(samples) // period
+    if not periods:
         raise ValueError("less than one period of it was kept")
-    mean = samples[len(samples) - whole * period :].reshape(whole, period, -1).mean(axis=0)
+    mean = samples[len(samples) - periods * period :].reshape(periods, period, -1).mean(axis=0)
     spectrum: ComplexArray = (2 / period * np.fft.rfft(mean, axis=0))[1 : period // 2]
     return spectrum
 
 
 def friction_shapes(probes: tuple[ProbeLines, ...], period: int) -> ComplexArray:
-    """(break-aways, probes, lines, axes): spectrum of the force that friction of 1 N along each axis is."""
+    """(break-aways, probes, lines, axes): spectrum of dry friction of 1 N along each axis of each probe's motion, for
+    every break-away length. period: samples.
+
+    Sample k is the friction at the end of the step from k to k + 1. It thus belongs to the command k, which is held
+    over that step and whose acceleration is read at its end; so commands and friction may be added line by line.
+    """
     position_m = np.stack([_position_m(probe, period) for probe in probes], axis=1)
     step_m = np.diff(position_m, axis=0, append=position_m[:1])
     lengths_m = np.array(BREAK_AWAYS_M)[:, None, None]
     force = np.zeros((len(BREAK_AWAYS_M), *position_m.shape[1:]))
-    kept = np.zeros((period, *force.shape))
+    one_period = np.zeros((period, *force.shape))
     for tick in range(PASSES * period):
-        way = step_m[tick % period][None]
-        # The exact solution over a step of constant direction: it never leaves -1 to 1, however long the step.
-        sign = np.sign(way)
-        force = np.where(way == 0, force, sign - (sign - force) * np.exp(-np.abs(way) / lengths_m))
-        kept[tick % period] = force
-    # A step leads to the next sample: half a sample later than the force that it began with.
-    spectrum: ComplexArray = 2 / period * np.fft.rfft(kept, axis=0)[1 : period // 2]
-    late = np.exp(1j * np.pi * np.arange(1, period // 2) / period)[:, None, None, None]
-    shapes: ComplexArray = np.moveaxis(spectrum * late, 0, 2)
+        step = step_m[tick % period][None]
+        direction = np.sign(step)
+        # Exact over a step of constant direction, so that the force never leaves -1 to 1, however long the step.
+        slid = direction - (direction - force) * np.exp(-np.abs(step) / lengths_m)
+        force = np.where(step == 0, force, slid)
+        one_period[tick % period] = force
+    spectrum: ComplexArray = 2 / period * np.fft.rfft(one_period, axis=0)[1 : period // 2]
+    shapes: ComplexArray = np.moveaxis(spectrum, 0, 2)
     return shapes
 
 
 def _position_m(probe: ProbeLines, period: int) -> FloatArray:
-    """(period, axes): of the encoders, which sit where friction acts; else the acceleration integrated twice."""
+    """(period, axes): from the encoders, which sit where friction acts; without them, the acceleration integrated
+    twice."""
     frequency_hz = probe.frequency_hz[:, None]
     if np.isfinite(probe.position_m).all():
         lines = np.where(frequency_hz <= TO_HZ, probe.position_m, 0)

@@ -292,7 +292,7 @@ AUTOREGRESSIVE_ORDER = 24  # order of the autoregressive model
 MOST_BASE_LAWS = 10
 BASE_LAW_GAIN = 0.01  # share of the folds' error that a further law must take
 RESPONSE_BAND_SHARE = 0.999  # share of the response's power below the band's end
-RESPONSE_OVERSAMPLED = 3.0  # samples per period of the band's end, at least
+RESPONSE_OVERSAMPLED = 3.0  # decimated rate over twice the frequency of the band's end, at least
 SENSOR_TAPS = 2  # samples before and after that predict a reading: filters of the two sensors differ by so much
 PART_LEAST_SAMPLES = 64  # samples of a part at least
 # samples of a recording that are used at most, its last: enough to find a fault that matters, in bounded time

@@ -1,4 +1,15 @@
-"""Loose joint: dry friction alone within a gap, a spring beyond it."""
+"""Loose joint between two bodies: dry friction everywhere, and beyond a gap a spring.
+
+With r the relative displacement of the bodies, g the gap, k the stiffness and F_c the slip force,
+
+    F = -k (|r| - g / 2) sgn(r) [|r| > g / 2] - F_c sgn(dr/dt).
+
+Over a step the spring's force is the mean of those at its ends, weighted by theta (the theta method of implicit
+integration): F = -k ((1 - theta) p + theta p+), with p the deflection of the spring at the start and p+ = p_free + c F
+that at the end, which depends on F by the compliance c of the structure over the step. theta is 1/2 (trapezoidal rule)
+where k c is small and goes to 1 (backward Euler) where the spring is too stiff for the step, for the trapezoidal rule
+would ring there. Friction is solved last, against the velocity that the spring leaves (`friction_force`).
+"""
 
 from itertools import product
 
@@ -22,53 +33,56 @@ STEPS = 8
 GAPS, STIFFNESSES, SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
 """Starting values that are tried: gaps relative to the joint's rms travel in the model; stiffnesses relative to the
 model's; slip forces relative to the product of both."""
-TRIED_S, SETTLING, FINER = 2.0, 4, 4
-"""Seconds of the recording that are simulated; divisor of the share left out at the beginning because it is not at
-rest; number of the best pairs of gap and stiffness that are tried with every slip force."""
-_FAST: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
+TRIED_S = 2.0
+"""Length of the excerpt that is simulated (s)."""
+SETTLING = 4
+"""The first of so many equal parts of the excerpt is not compared: the recording was not at rest there."""
+FINER = 4
+"""Number of the best pairs of gap and stiffness that are tried with every slip force."""
+_NO_FORCE: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Spring force beyond the gap, averaged over the step, then as much friction as is needed to stop the motion, up to
-    its limit."""
-    half, stiffness, slip = 0.5 * parameters[0], parameters[1], parameters[2]
-    spring = last = 0.0
-    for way in (1.0, -1.0):
-        start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
-        if start > 0 or end > 0:
-            # Weighted towards the force at the end where the spring is too stiff for the step: the mean would
-            # overshoot.
-            slack = stiffness * at[X_PER_N]
-            late = (0.5 + slack) / (1 + slack)
-            push = stiffness * ((1 - late) * start + late * end) / (1 + late * slack)
-            if end - at[X_PER_N] * push < 0:
-                push = stiffness * (1 - late) * start
-            spring = -way * max(push, 0.0)
-            last = -way * stiffness * max(end + way * at[X_PER_N] * spring, 0.0)
+    """Mean force of spring and friction over the step; `at[F_END]` becomes that at its end."""
+    half_gap, stiffness, slip = 0.5 * parameters[0], parameters[1], parameters[2]
+    spring = spring_at_end = 0.0
+    for side in (1.0, -1.0):
+        start, free_end = max(side * at[X] - half_gap, 0.0), side * at[X_FREE] - half_gap
+        if start > 0 or free_end > 0:
+            ratio = stiffness * at[X_PER_N]
+            theta = (0.5 + ratio) / (1 + ratio)
+            push = stiffness * ((1 - theta) * start + theta * free_end) / (1 + theta * ratio)
+            if free_end - at[X_PER_N] * push < 0:  # contact is lost within the step: no force at its end
+                push = stiffness * (1 - theta) * start
+            spring = -side * max(push, 0.0)
+            spring_at_end = -side * stiffness * max(free_end + side * at[X_PER_N] * spring, 0.0)
             break
     at[V_FREE] += at[V_PER_N] * spring
-    slipped = friction_force(slip, slip, memory[0], memory, at)
-    at[F_END] += last
-    return float(spring + slipped)
+    friction = friction_force(slip, slip, memory[0], memory, at)
+    at[F_END] += spring_at_end
+    return float(spring + friction)
 
 
 def joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
-    """(n,): direction of motion of a joint near a driven axis: against the heaviest body attached to the axis, or
-    against the ground where there is none."""
+    """(n,): direction of motion, in the model's coordinates, of a joint near a driven axis: between the axis and the
+    body, among those that no command drives, which has the largest kinetic energy where it follows the axis without
+    inertia (mass times squared static ratio); against the ground where no such body is coupled to the axis."""
     along, axes = driven_axes(model)[:, axis], driven_axes(model)
-    carried = np.linalg.norm(axes, axis=1) < 1e-9
-    if not carried.any():
+    undriven = np.linalg.norm(axes, axis=1) < 1e-9
+    if not undriven.any():
         return along
-    held = np.diagonal(model.stiffness)
-    tied = np.where(carried & (held > 0), model.stiffness @ along / np.where(held > 0, held, 1.0), 0.0)
-    weight = np.diagonal(model.mass) * tied**2
-    body = int(np.argmax(weight))
-    if weight[body] == 0:
+    own_stiffness = np.diagonal(model.stiffness)
+    is_held = undriven & (own_stiffness > 0)
+    static_ratio = np.where(is_held, model.stiffness @ along / np.where(own_stiffness > 0, own_stiffness, 1.0), 0.0)
+    energy = np.diagonal(model.mass) * static_ratio**2
+    body = int(np.argmax(energy))
+    if energy[body] == 0:
         return along
-    follows = np.where(carried, 0.0, -model.stiffness[body] / held[body])
-    follows[body] = -1.0
-    return np.asarray(follows)
+    # The static position of the body under the driven axes' motion, less its own.
+    relative = np.where(undriven, 0.0, -model.stiffness[body] / own_stiffness[body])
+    relative[body] = -1.0
+    return np.asarray(relative)
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[MechanicalModel, FloatArray]:
@@ -80,33 +94,38 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """The best of a coarse grid, by the residual on an excerpt of the record: first gaps and stiffnesses, then
-    slips."""
+    """The two best of a coarse grid, by the error of a simulation of an excerpt: first gaps and stiffnesses, with a
+    medium slip force, then slip forces."""
     part, joint = _strongest_part(evidence, axis), joint_direction(evidence.model, axis)
-    travel = float(np.std(_simulate_part(evidence, axis, _FAST, part)[1]))
-    held = max(abs(value_along(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
+    travel = float(np.std(_simulate_part(evidence, axis, _NO_FORCE, part)[1]))
+    model_stiffness = max(abs(value_along(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
     measured = evidence.response[part]
 
-    def left(values: Values) -> float:
-        off = (_simulate_part(evidence, axis, values, part)[0] - measured) / evidence.noise
-        return float(np.mean(off[len(off) // SETTLING :] ** 2))
+    def mean_square(values: Values) -> float:
+        error = (_simulate_part(evidence, axis, values, part)[0] - measured) / evidence.noise
+        return float(np.mean(error[len(error) // SETTLING :] ** 2))
 
-    def at(gap: float, stiffness: float, slip: float) -> Values:
-        return {"gap": gap * travel, "stiffness": stiffness * held, "slip": slip * held * travel}
+    def scaled(gap: float, stiffness: float, slip: float) -> Values:
+        return {
+            "gap": gap * travel,
+            "stiffness": stiffness * model_stiffness,
+            "slip": slip * model_stiffness * travel,
+        }
 
-    middle = SLIPS[len(SLIPS) // 2]
-    tried = {where: left(at(*where, middle)) for where in product(GAPS, STIFFNESSES)}
-    best = sorted(tried, key=tried.__getitem__)[:FINER]
-    found = [(tried[where], at(*where, middle)) for where in best]
-    found += [(left(at(*where, slip)), at(*where, slip)) for where in best for slip in SLIPS if slip != middle]
+    medium = SLIPS[len(SLIPS) // 2]
+    errors = {pair: mean_square(scaled(*pair, medium)) for pair in product(GAPS, STIFFNESSES)}
+    best = sorted(errors, key=errors.__getitem__)[:FINER]
+    found = [(errors[pair], scaled(*pair, medium)) for pair in best]
+    others = [scaled(*pair, slip) for pair in best for slip in SLIPS if slip != medium]
+    found += [(mean_square(values), values) for values in others]
     return tuple(values for _, values in sorted(found, key=lambda item: item[0])[:2])
 
 
 def _strongest_part(evidence: Evidence, axis: int) -> slice:
     """The excerpt in which the axis, and with it the joint, is accelerated most."""
     length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
-    shaken = np.gradient(evidence.axis_velocity[:, axis])
-    power = np.cumsum(np.append(0.0, shaken**2 * evidence.used))
+    acceleration = np.gradient(evidence.axis_velocity[:, axis])
+    power = np.cumsum(np.append(0.0, acceleration**2 * evidence.used))
     first = int(np.argmax(power[length:] - power[:-length]))
     return slice(first, first + length)
 
@@ -115,10 +134,11 @@ def _simulate_part(evidence: Evidence, axis: int, values: Values, part: slice) -
     """The response (n, p), and the joint's travel (n,)."""
     bodies = bodies_of(evidence.model, (PlacedEffect(EFFECT, (axis,), values),))
     commands, rate_hz = evidence.command[part], evidence.sample_rate_hz
-    looked, _ = simulate_bodies(bodies, ActuatorForce(commands, commands), (len(commands), STEPS), 1 / rate_hz / STEPS)
+    outputs, _ = simulate_bodies(bodies, ActuatorForce(commands, commands), (len(commands), STEPS), 1 / rate_hz / STEPS)
+    # Columns: positions, velocities and accelerations of the ports, then the response; the joint is the last port.
     ports = bodies.ports.shape[1]
-    response = looked[:, 3 * ports : 3 * ports + evidence.model.outputs]
-    return low_pass(response, rate_hz, evidence.model.sensor.bandwidth_hz), looked[:, ports - 1]
+    response = outputs[:, 3 * ports : 3 * ports + evidence.model.outputs]
+    return low_pass(response, rate_hz, evidence.model.sensor.bandwidth_hz), outputs[:, ports - 1]
 
 
 EFFECT = Effect(

@@ -1,4 +1,8 @@
-"""Plausible range of the handle's position readings. A reading beyond it is a sensor fault: the force is released."""
+"""Plausible range of the handle's position readings. A reading beyond it is a sensor fault: the force is released.
+
+Checked at every tick by `study/devices/governor`. A bound that is too narrow ends sound trials; one that is too wide
+lets spring and damper answer a false position with force, up to the feedback's cap.
+"""
 
 from dataclasses import asdict
 from typing import Annotated
@@ -11,8 +15,8 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class PlausibilitySettings:
-    """Bounds of the position's readings. Each is several times what a hand and the shipped forces do: measured maxima
-    of the simulated omega.3 over all shipped protocols, with and without a hand, stand beside the defaults."""
+    """Bounds of the position's readings. Each default is several times what a hand and the shipped forces do; the
+    maximum measured on the simulated omega.3 over all shipped protocols, with and without a hand, stands beside it."""
 
     workspace_m: Annotated[
         float,
@@ -73,8 +77,8 @@ class PlausibilitySettings:
         Field(
             gt=0,
             le=5,
-            description="A position that has not changed for so long, while the force must have moved even a handle "
-            "that is gripped hard (1 kg, 60 N s/m, 3000 N/m) by twice the resolution, is stale. Default 0.1: a "
+            description="A position is stale that has not changed for this time although the force must have moved "
+            "even a handle that is gripped hard (1 kg, 60 N s/m, 3000 N/m) by twice the resolution. Default 0.1: a "
             "handle that sticks at its turning points does so for less, from 2 Hz on.",
         ),
     ] = 0.1
@@ -83,12 +87,12 @@ class PlausibilitySettings:
         Field(
             gt=0,
             le=60,
-            description="Where the spring pulls with more than friction_n at a position that does not change, half of "
-            "this later the pull is taken back within the other half. A hand that rests on the spring then gives way; "
-            "a position that has not changed even so is stale. Default 1.",
+            description="Longest time for which the spring pulls with more than friction_n at a position that does "
+            "not change. After half of it, the pull is faded out over the other half: a hand that rested on the spring "
+            "moves then, and a position that has still not changed is stale. Default 1.",
         ),
     ] = 1.0
 
 
 UNTOUCHED = asdict(PlausibilitySettings())
-"""The table as it is where nothing of it is written."""
+"""The default values, with which a protocol has the hash that it had before this table existed."""

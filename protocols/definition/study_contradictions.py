@@ -10,16 +10,17 @@ from protocols.definition.probes import probe_contradictions
 from protocols.definition.problem import Problem
 
 if TYPE_CHECKING:
-    from protocols.definition.preparation import DemoSettings, PracticeSettings
     from protocols.definition.study_protocol import StudyProtocol
 
 ROUNDING_N = 1e-9
-"""Tolerance for rounding when forces are compared."""
+"""Tolerance for rounding when forces are compared (N)."""
 
 
 def contradictions(protocol: StudyProtocol) -> list[Problem]:
     """All contradictions between tables of the protocol; empty if it is consistent."""
     return [
+        *_caps(protocol),
+        *_placement(protocol),
         *_levels(protocol),
         *_times(protocol),
         *_names(protocol),
@@ -28,48 +29,60 @@ def contradictions(protocol: StudyProtocol) -> list[Problem]:
     ]
 
 
-def _levels(protocol: StudyProtocol) -> list[Problem]:
-    problems, cap_n = [], protocol.staircase.cap_n
-    if protocol.safety.stimulus_cap_n < cap_n:
-        wrong = f"is {protocol.safety.stimulus_cap_n} N, below staircase.cap_n: the highest levels could not be played"
-        problems.append(Problem("safety.stimulus_cap_n", wrong, f"at least {cap_n} N, the staircase's cap"))
-    elif (highest_n := roved_up_n(cap_n, protocol.stimulus.rove_db)) > protocol.safety.stimulus_cap_n + ROUNDING_N:
-        wrong = f"is {cap_n:g} N, and roving (stimulus.rove_db) adds up to {highest_n - cap_n:.3g} N to it"
-        room_n = roved_up_n(protocol.safety.stimulus_cap_n, -protocol.stimulus.rove_db)
-        allowed = f"at most {math.floor(1000 * room_n) / 1000:g} N, so that none is above safety.stimulus_cap_n"
-        problems.append(Problem("staircase.cap_n", wrong, allowed))
+def highest_roved_n(level_n: float, rove_db: float) -> float:
+    """The highest level (N) that roving draws: half of its range in dB lies above `level_n`."""
+    return level_n * float(10.0 ** (rove_db / 2 / 20))
+
+
+def _caps(protocol: StudyProtocol) -> list[Problem]:
+    """The staircase's cap, roved, against the safety layer's."""
+    cap_n, safety_cap_n, rove_db = protocol.staircase.cap_n, protocol.safety.stimulus_cap_n, protocol.stimulus.rove_db
+    if safety_cap_n < cap_n:
+        wrong = f"is {safety_cap_n} N, below staircase.cap_n: the highest levels could not be played"
+        return [Problem("safety.stimulus_cap_n", wrong, f"at least {cap_n} N, the staircase's cap")]
+    highest_n = highest_roved_n(cap_n, rove_db)
+    if highest_n <= safety_cap_n + ROUNDING_N:
+        return []
+    wrong = f"is {cap_n:g} N, and roving (stimulus.rove_db) adds up to {highest_n - cap_n:.3g} N to it"
+    room_n = safety_cap_n / highest_roved_n(1.0, rove_db)
+    # Rounded down, so that the cap which the message allows is allowed.
+    allowed = f"at most {math.floor(1000 * room_n) / 1000:g} N, so that none is above safety.stimulus_cap_n"
+    return [Problem("staircase.cap_n", wrong, allowed)]
+
+
+def _placement(protocol: StudyProtocol) -> list[Problem]:
+    """What the Bayesian placement of levels (Psi) needs: levels as planned, and room for all its trials."""
+    problems, trials = [], protocol.staircase.bayesian.trials
     if protocol.stimulus.rove_db and protocol.staircase.is_bayesian:
         wrong = f"is {protocol.stimulus.rove_db:g} dB, but Psi takes the levels of its answers as they are planned"
         problems.append(Problem("stimulus.rove_db", wrong, "0, or 0 in staircase.bayesian.trials"))
-    trials = protocol.staircase.bayesian.trials
+    # The limit of a training run may be lower: training needs no threshold.
     limits = {
         "staircase.trial_limit": protocol.staircase.trial_limit,
         "detection.trial_limit": protocol.detection.trial_limit if protocol.detection.frequencies_hz else 0,
     }
-    for key, limit in limits.items():  # of a training run none is wrong: it needs no threshold
+    for key, limit in limits.items():
         if 0 < limit < trials:
             wrong = f"is {limit}, and would end every such run before the {trials} trials of Psi"
             problems.append(Problem(key, wrong, f"0, or at least {trials}, as in staircase.bayesian.trials"))
-    levels = {
-        "demo.level_n": _highest_n(protocol.demo),
-        "practice.level_n": _highest_n(protocol.practice) if protocol.practice.frequencies_hz else 0.0,
-        "detection.start_n": protocol.detection.start_n if protocol.detection.frequencies_hz else 0.0,
-    }
-    for key, level_n in levels.items():
-        if level_n > cap_n:
-            wrong = f"is {level_n:g} N, with its rove_db, above staircase.cap_n"
-            problems.append(Problem(key, wrong, f"at most {cap_n} N, the cap"))
     return problems
 
 
-def _highest_n(settings: DemoSettings | PracticeSettings) -> float:
-    """Highest level of a roved stimulus (N): half of the range in dB lies above `level_n`."""
-    return roved_up_n(settings.level_n, settings.rove_db)
-
-
-def roved_up_n(level_n: float, rove_db: float) -> float:
-    """The highest level (N) drawn from `rove_db` around a level; the lowest, where `rove_db` is negative."""
-    return level_n * float(10.0 ** (rove_db / 40.0))
+def _levels(protocol: StudyProtocol) -> list[Problem]:
+    """Levels outside the staircases on directions, against the staircase's cap."""
+    cap_n, practice, detection = protocol.staircase.cap_n, protocol.practice, protocol.detection
+    highest_n = {
+        "demo.level_n": highest_roved_n(protocol.demo.level_n, protocol.demo.rove_db),
+        "practice.level_n": highest_roved_n(practice.level_n, practice.rove_db) if practice.frequencies_hz else 0.0,
+        "detection.start_n": detection.start_n if detection.frequencies_hz else 0.0,
+    }
+    problems = []
+    for key, level_n in highest_n.items():
+        if level_n > cap_n + ROUNDING_N:
+            roved = "" if key == "detection.start_n" else ", with its rove_db,"
+            wrong = f"is {level_n:g} N{roved} above staircase.cap_n"
+            problems.append(Problem(key, wrong, f"at most {cap_n} N, the cap"))
+    return problems
 
 
 def _times(protocol: StudyProtocol) -> list[Problem]:
@@ -82,7 +95,9 @@ def _times(protocol: StudyProtocol) -> list[Problem]:
         period_s = 1 / min(frequencies)
         if protocol.measurement.keep_s < period_s:
             wrong = f"is {protocol.measurement.keep_s} s, less than one period of the lowest frequency"
-            problems.append(Problem("measurement.keep_s", wrong, f"at least {period_s:g} s"))
+            # Rounded up, so that the time which the message allows is allowed.
+            least_s = math.ceil(1e4 * period_s - 1e-6) / 1e4
+            problems.append(Problem("measurement.keep_s", wrong, f"at least {least_s:g} s"))
     else:
         wrong = "is empty, and so are training, practice and detection: nothing would be played"
         problems.append(Problem("stimulus.frequencies_hz", wrong, "at least one frequency in one of them"))

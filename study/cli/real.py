@@ -28,16 +28,17 @@ def real(
         typer.Option(
             min=0,
             max=10_000,
-            help="So many draws of faults, half of them of none, are injected under a seal, and looked for.",
+            help="Number of faults, half of them none, that are drawn, injected under a seal and diagnosed blind.",
         ),
     ] = 0,
-    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Of the draws of these faults.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Of the draw of these faults.")] = 1,
     scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Diagnose a folder of real recordings: what was named, what is left, what an expert would object.
 
-    Maps that lie beside the recordings are taken, else ours. Interrupted, the same command goes on.
+    Maps that lie beside the recordings are used, else those that come with hapteq. After an interruption, the same
+    command goes on.
     """
     import json
 

@@ -1,4 +1,4 @@
-"""`--scheduler`, where a command can hand its work to a cluster."""
+"""Option `--scheduler`: a command hands its work to the workers of a dask cluster."""
 
 from collections.abc import Iterator
 from concurrent.futures import Executor
@@ -11,7 +11,8 @@ SchedulerOption = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Of a dask scheduler, whose workers (dask worker ADDRESS --nthreads 1) do it; no common disk is needed.",
+        help="Address of a dask scheduler, whose workers (dask worker ADDRESS --nthreads 1) do the work; no common "
+        "disk is needed.",
     ),
 ]
 

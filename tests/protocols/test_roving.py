@@ -113,3 +113,8 @@ def test_roving_counts_in_the_fingerprint_only_where_it_is_used(small_text):
 
 def test_shipped_studies_play_the_staircases_level(shipped):
     assert shipped.stimulus.rove_db == 0.0
+
+
+def test_a_level_roved_to_the_cap_but_for_rounding_is_taken(small_text):
+    level_n = 3.0 * 10 ** (-6.0 / 40) * (1 + 1e-12)
+    load_protocol(f"{small_text}\n[demo]\nlevel_n = {level_n!r}\nrove_db = 6.0\n", "mine.toml")

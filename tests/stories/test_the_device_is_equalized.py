@@ -14,7 +14,7 @@ from equalizer.identification.frequency_response.transfer_estimate import estima
 from equalizer.identification.state_space.identify import identify
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
-from equalizer.tracking.feedforward.quality import quality
+from equalizer.tracking.feedforward.quality import measure_quality
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.devices.device import DeviceInfo, DeviceSettings
@@ -55,7 +55,7 @@ def equalized(hand: bool, seed: int):
     try:
         recordings = [recorded(device, piece) for piece in pieces(protocol, RATE_HZ) if piece.segment.role == "fit"]
         equalizer = ModelEqualizer(identify(estimate_transfer(recordings)).model)
-        return quality(np.stack([played(device, equalizer, axis) for axis in range(3)], axis=2))
+        return measure_quality(np.stack([played(device, equalizer, axis) for axis in range(3)], axis=2))
     finally:
         device.close()
 

@@ -1,9 +1,13 @@
 """Laws of a driven motion that cannot be distinguished from laws of its actuator.
 
-Without reversal, friction is a constant force that must be overcome from rest: a dead band has the same effect, and a
-drag beside it may be the curve of that actuator. Where inertia is negligible, speed follows the command: a drag that
-grows with the speed is then equivalent to a gain that falls with the command, and a dead band to dry friction. Where an
-axis rests as long as its dead band passes no force, dry friction may hold it instead: the two are named as a class.
+In the balance m a + d v + F_c sgn v + c v |v| = g(u) of a motion v that a command u drives:
+
+- Without reversal, F_c sgn v is a constant while it moves, and holds it at rest below u = F_c: so does a dead band
+  g(u) = u - F_c, and the drag c v |v| beside it may be the curve of that actuator.
+- Where m a is negligible, v is a function of u: drag that grows with v equals a gain that falls with u, and a dead band
+  dry friction.
+- Where the axis rests as long as its dead band passes no force, dry friction may hold it instead: the two are named as
+  a class.
 """
 
 from dataclasses import replace
@@ -18,6 +22,7 @@ from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
 
 DEAD_BAND = "force_deadband"
 EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND: "coulomb_friction"}
+"""Where inertia is negligible."""
 BACKWARDS = "it never moves backwards"
 
 
@@ -52,7 +57,8 @@ def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
 
 
 def _rests_within(regression: Regression) -> bool:
-    """Whether the axis rests in most samples in which its dead band passes no force."""
+    """Whether the axis rests in most samples in which its dead band passes no force: the regression's forces are those
+    behind the dead band."""
     motions, axis, own = regression.motions, regression.axis, regression.beside.own
     speed = np.concatenate([motion.velocity[motion.fit, own] for motion in motions])
     force = np.concatenate([motion.force[motion.fit, axis] for motion in motions])
@@ -61,25 +67,27 @@ def _rests_within(regression: Regression) -> bool:
 
 
 def _mark_alike(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
+    """The law without its name, and with the law that it may be mistaken for."""
     alike = tuple(dict.fromkeys((twin, *judged.alike)))
     return replace(judged, alike=alike, why_not=f"these data cannot tell it from {twin}, for {why}")
 
 
 def _reverses(regression: Regression, channel: int) -> bool:
-    """Whether the motion goes both ways beyond the threshold for standstill."""
-    speed = np.concatenate([motion.velocity[motion.fit, channel] for motion in regression.motions])
-    ways = [float(np.sum(np.maximum(way * speed, 0.0) ** 2)) for way in (1.0, -1.0)]
-    return min(ways) > STILL_SHARE * max(ways)
+    """Whether the squared speed of either direction is more than the share of standstill of the other's."""
+    velocity = np.concatenate([motion.velocity[motion.fit, channel] for motion in regression.motions])
+    power = [float(np.sum(np.maximum(sign * velocity, 0.0) ** 2)) for sign in (1.0, -1.0)]
+    return min(power) > STILL_SHARE * max(power)
 
 
 def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
-    """Whether a mass reduces the cross-validated error notably, and delays the speed by more than a sample."""
+    """Whether a mass reduces the cross-validated error notably, and delays the speed by more than a sample. True where
+    the mass is given, or where it cannot show, without a time axis."""
     columns, own = regression.columns_of(laws), regression.beside.own
     if regression.mass is not None or not np.isfinite(regression.motions[0].band_hz):
         return True
-    rest = [column for column in columns if column != own]
-    without, held = (Structure(laws, regression.cross_validated_errors(each)) for each in (rest, columns))
+    massless = [column for column in columns if column != own]
+    without, with_mass = (Structure(laws, regression.cross_validated_errors(each)) for each in (massless, columns))
     weights = regression.weights(columns)
     mass, damping = (float(weights[columns.index(k)]) for k in (own, len(regression.motions[0].channels) + own))
-    # A shorter time constant cannot be distinguished from the hold of the command.
-    return mass * regression.motions[0].rate_hz > max(damping, 0.0) and is_better(without, held)
+    # A time constant m / d below a sample cannot be distinguished from the hold of the command.
+    return mass * regression.motions[0].rate_hz > max(damping, 0.0) and is_better(without, with_mass)

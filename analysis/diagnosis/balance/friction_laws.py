@@ -1,4 +1,18 @@
-"""Dry friction and damping along one measured motion, over grids of speeds, widths and time constants."""
+"""Dry friction and damping along one measured motion, over grids of speeds, widths and time constants.
+
+With sigma = tanh(v / width) in place of sgn v, tau = -1 to 1 over the part, and weights w, the force that resists the
+motion (equations and sources of each: the file of its name in `equalizer/effects`):
+
+    coulomb_friction             w sigma
+    stribeck_friction            w1 sigma + w2 sigma exp(-(v / v_s)^2)
+    presliding_hysteresis        w z,  dz/dx = (1 - z sgn v) / z_max                    (Dahl)
+    asymmetric_friction          w1 max(sigma, 0) + w2 min(sigma, 0)
+    drifting_friction            (w1 + w2 tau) sigma
+    position_dependent_friction  (w1 + w2 q + w3 q^2) sigma
+    quadratic_damping            w v |v|
+    drifting_damping             w tau v
+    viscoelastic_relaxation      w T / (1 + T s) v                                      (Maxwell: spring and damper)
+"""
 
 from collections.abc import Iterator
 
@@ -21,11 +35,12 @@ from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
 
 SHARP = RESTS
-"""Width of the smoothed sign of dry friction, relative to the rms speed, unless the data show a wider one."""
+"""Width of tanh(v / width), relative to the rms speed, unless the data show a wider one: as slow as an axis may move
+that counts as resting."""
 
 
 def friction_widths(of: Scales) -> tuple[FloatArray, tuple[tuple[float, float]]]:
-    """Widths of the smoothed sign of dry friction, m/s, and the bounds of their refinement."""
+    """Widths of the smoothed sign of dry friction, m/s, and bounds within which speeds of friction are refined."""
     sharp = SHARP * of.speed
     return sharp * np.geomspace(1.0, 50.0, 7), ((0.1 * sharp, 0.5 * of.speed),)
 
@@ -34,6 +49,8 @@ def friction_laws(c: int, of: Scales) -> Iterator[Law]:
     """Coulomb, Stribeck, presliding, asymmetric, drifting and position-dependent friction along channel c, with start
     values on grids of its speed and travel."""
     sharp = SHARP * of.speed
+    # Stribeck velocities beyond these bounds, half the rms speed, stay as on their grid: there the law can hardly be
+    # told from Coulomb friction with quadratic damping, and refining it gains nothing.
     widths_of_sign, spans = friction_widths(of)
     for width in widths_of_sign:
         yield Law(
@@ -90,27 +107,28 @@ def _asymmetric_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, floa
 
 def _drifting_columns(c: int, sharp: float) -> Columns:
     def columns(m: Motion, _: Numbers) -> FloatArray:
-        rubbing = smooth_sign(m.velocity[:, [c]], sharp)
-        return np.hstack([rubbing, rubbing * relative_time(m)])
+        sign = smooth_sign(m.velocity[:, [c]], sharp)
+        return np.hstack([sign, sign * relative_time(m)])
 
     return columns
 
 
 def _drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-    """Parameters of a drifting friction; None where it would be negative somewhere in the part: it would drive the
-    motion."""
+    """None where the friction would be negative somewhere in the part, and drive the motion."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > abs(w[1]) else None
 
 
 def _position_dependent_columns(c: int, sharp: float) -> Columns:
     def columns(m: Motion, _: Numbers) -> FloatArray:
-        rubbing, q = smooth_sign(m.velocity[:, [c]], sharp), m.position[:, [c]]
-        return np.hstack([rubbing, rubbing * q, rubbing * q**2])
+        sign, q = smooth_sign(m.velocity[:, [c]], sharp), m.position[:, [c]]
+        return np.hstack([sign, sign * q, sign * q**2])
 
     return columns
 
 
 def _position_dependent_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    """None where the friction would be negative at q = 0. Elsewhere the effect holds it at zero where the parabola is
+    negative."""
     if w[0] <= 0:
         return None
     return {"level": float(w[0]), "slope_per_m": float(w[1] / w[0]), "bend_per_m2": float(w[2] / w[0])}

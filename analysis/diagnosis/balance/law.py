@@ -1,4 +1,12 @@
-"""A term of a force balance: its columns along a measured motion, and the parameters that follow from its weights."""
+"""A term of a force balance: its columns along a measured motion, and the parameters that follow from its weights.
+
+The balance of one axis is linear in its weights w,
+
+    f(t) = m a(t) + d v(t) + k q(t) + c + sum over laws l of phi_l(q, v, a, ...; n_l)' w_l + e(t),
+
+with the force f, the measured motion q, v, a, and for each law columns phi (regressors) that may depend on a few
+nonlinear parameters n, such as the width of a gap. A law here resists the motion, as mass and damping do.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,7 +21,7 @@ from equalizer.signals.signal import FloatArray
 Numbers = tuple[float, ...]
 """Nonlinear parameters: speeds, pitches, time constants; in SI units."""
 Columns = Callable[[Motion, Numbers], FloatArray]
-"""(n, weights)"""
+"""Maps a motion and nonlinear parameters to the law's regressors (n, weights)."""
 Values = Callable[[FloatArray, Numbers, float], dict[str, float] | None]
 """Maps weights (weights,), nonlinear parameters and the moving mass to the effect's parameters; None where the signs
 are not physical."""
@@ -39,12 +47,13 @@ class Law:
     channel: int
     """Channel of the motion that it depends on; -1 = none."""
     numbers: Numbers
+    """Values of its nonlinear parameters."""
     columns: Columns
     values: Values
     linear: bool = False
     """Whether it is linear in the motion: a linear model of a higher order could replace it."""
     bounded: tuple[tuple[float, float], ...] = ()
-    """Bounds of each nonlinear parameter."""
+    """Bounds of each nonlinear parameter within which it is refined; empty: as given."""
     formula: Callable[[dict[str, float]], Formula] | None = None
     """From its parameters to the formula that simulations use where the catalogue has no such effect."""
 
@@ -68,7 +77,7 @@ class BaseTerms:
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """Sizes of one channel's motion on the fit samples."""
+    """Sizes of one channel's motion on the fit samples, in m or rad and s."""
 
     speed: float
     """rms"""
@@ -77,7 +86,9 @@ class Scales:
     low: float
     high: float
     seconds: float
+    """Duration of all fit samples."""
     band_hz: float
+    """Upper end of the band; infinite without a time axis."""
     turns: bool
     """Whether the shaft makes more than two turns: only the position within a turn matters."""
     rotational: bool
@@ -115,8 +126,9 @@ def name_positive_weight(name: str) -> Values:
 
 
 def filter_from_rest(samples: FloatArray, rate_hz: float, gain: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """(n, k): samples through a causal linear filter that starts from rest. gain: frequency response at s (rad/s).
-    Computed by FFT, zero-padded to twice the length so that the filter's memory does not wrap round."""
+    """(n, k): samples through a linear filter that starts from rest. gain: its continuous transfer function at
+    s = i omega, omega (lines,) in rad/s. Computed by FFT, zero-padded to twice the length so that the filter's memory,
+    which must be shorter than the samples, does not wrap round."""
     count = len(samples)
     padded = next_fast_len(2 * count, real=True)
     spectrum = rfft(samples, padded, axis=0)

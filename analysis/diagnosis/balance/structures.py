@@ -1,6 +1,10 @@
-"""Sums of one to three laws that explain a force along a measured motion, by a beam search over cross-validated errors.
+"""Sums of one to three laws that explain a force along a measured motion: a beam search over cross-validated errors.
 
-`simplest_structure` then selects, among the ranked sums, the fewest parameters at about the least error.
+From the linear structure (mass, damping, stiffness) on, every structure in the beam is extended by each further law;
+weights are least squares, nonlinear parameters of the best are refined, and the best `STRUCTURES_BEAM` go on, while
+each size is significantly better than the one before (`is_better`). The error of a structure is the sum over folds of
+the squared force error with weights fitted to the other folds (`regression`). `simplest_structure` then selects, among
+all structures, the fewest parameters at about the least error.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,18 +37,19 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 REFINED = (0.8, 0.93, 1.075, 1.25)
-"""Factors on a nonlinear parameter in a coordinate search."""
+"""Factors on a nonlinear parameter that one pass of a coordinate search tries."""
 ROUNDS = 6
 """Most passes of the search over the nonlinear parameters of a sum's laws."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Structure:
-    """A sum of laws, by their numbers in a regression, with the cross-validated sum of squares of each fold."""
+    """A sum of laws with its cross-validated errors."""
 
     laws: tuple[int, ...]
+    """Indices in a regression's `laws`."""
     errors: FloatArray
-    """(folds,)"""
+    """(folds,): sums of squares."""
 
     @property
     def error(self) -> float:
@@ -54,10 +59,10 @@ class Structure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StructureSearch:
-    """Result of the search for sums of laws: the linear structure, the best, and the best of each set of effects."""
+    """Result of the search for sums of laws."""
 
     regression: Regression
-    """The regression with the refined laws of the final structures."""
+    """With the refined laws of the final structures."""
     linear: Structure
     best: Structure
     ranked: tuple[Structure, ...]
@@ -118,22 +123,24 @@ def _beam(first: Regression, linear: Structure, time_left: TimeBudget) -> tuple[
 
 
 def is_better(plain: Structure, richer: Structure) -> bool:
-    """Whether more laws are significant: a sufficient gain in error power over the folds, either absolutely; or
-    relative to each fold's own error, because an end stop reached in one fold only makes absolute gains unequal; or as
-    a share of all errors, because an end stop reached in few folds has no gain in the others."""
+    """Whether more laws are significant. With errors p_i and r_i of the folds, the total must fall by
+    `FURTHER_LAW_GAIN`, and the sum of one of these must exceed its standard error `FURTHER_LAW_ERRORS` times: of
+    p_i - r_i; of log(p_i / r_i), because an end stop that is reached in one fold makes the differences unequal; of
+    p_i - r_i with the standard error of sum r / sum p, because an end stop that is reached in few folds gains nothing
+    in the others."""
     floor = 1e-12 * plain.error / len(plain.errors)
     shares = np.log(np.maximum(plain.errors, floor) / np.maximum(richer.errors, floor)) if floor > 0 else np.zeros(1)
     gains = plain.errors - richer.errors
-    agreed = _is_significant(gains, gains) or _is_significant(shares, shares)
-    # The standard error of a ratio of totals (Cochran, Sampling Techniques, 3rd ed., equation 6.4).
-    agreed = agreed or _is_significant(gains, gains - (1 - richer.error / max(plain.error, 1e-300)) * plain.errors)
+    # Residuals of the gains about their ratio to the errors (Cochran, Sampling Techniques, 3rd ed., equation 6.4).
+    about_ratio = gains - (1 - richer.error / max(plain.error, 1e-300)) * plain.errors
+    agreed = _is_significant(gains, gains) or _is_significant(shares, shares) or _is_significant(gains, about_ratio)
     return richer.error < (1 - FURTHER_LAW_GAIN) * plain.error and agreed
 
 
-def _is_significant(gains: FloatArray, about: FloatArray) -> bool:
-    """about: the gains minus the expected ones, or the gains themselves where these equal their mean."""
-    spread = float(np.std(about, ddof=1) * np.sqrt(len(about))) if len(about) > 1 else np.inf
-    return float(gains.sum()) > FURTHER_LAW_ERRORS * spread
+def _is_significant(gains: FloatArray, residuals: FloatArray) -> bool:
+    """Whether the gains' sum is many standard errors. residuals: the gains less their expectation, if not constant."""
+    standard_error = float(np.std(residuals, ddof=1) * np.sqrt(len(residuals))) if len(residuals) > 1 else np.inf
+    return float(gains.sum()) > FURTHER_LAW_ERRORS * standard_error
 
 
 def _linear_structure(regression: Regression) -> Structure:
@@ -141,7 +148,7 @@ def _linear_structure(regression: Regression) -> Structure:
 
 
 def _add_law_to_each(regression: Regression, beam: Sequence[Structure]) -> list[Structure]:
-    """Each structure with one more law: the best of each set of effects, sorted by error."""
+    """Each structure with one more law: the best physical one of each set of effects, sorted by error."""
     found: dict[tuple[tuple[str, int], ...], Structure] = {}
     for structure in beam:
         held = {regression.laws[k].key for k in structure.laws}
@@ -150,9 +157,9 @@ def _add_law_to_each(regression: Regression, beam: Sequence[Structure]) -> list[
                 continue
             laws = tuple(sorted((*structure.laws, number)))
             grown = Structure(laws, regression.cross_validated_errors(regression.columns_of(laws)))
-            name = tuple(sorted(regression.laws[k].key for k in laws))
-            if (name not in found or grown.error < found[name].error) and _is_physical(regression, laws):
-                found[name] = grown
+            effects = tuple(sorted(regression.laws[k].key for k in laws))
+            if (effects not in found or grown.error < found[effects].error) and _is_physical(regression, laws):
+                found[effects] = grown
     return sorted(found.values(), key=lambda each: each.error)
 
 
@@ -217,6 +224,7 @@ def refine_parameters(regression: Regression, structures: Sequence[Structure]) -
 
 
 def _refine_law(alone: Regression, place: int) -> Law:
+    """One law of a structure, refined by steps to its best neighbour. alone: with the structure's laws alone."""
     laws = tuple(range(len(alone.laws)))
     best = float(alone.cross_validated_errors(alone.columns_of(laws)).sum())
     for _ in range(ROUNDS):
@@ -232,10 +240,12 @@ def _refine_law(alone: Regression, place: int) -> Law:
 
 
 def _neighbours(law: Law) -> Iterator[Law]:
+    """The law with each nonlinear parameter moved by each factor, within its bounds."""
     for place, (low, high) in enumerate(law.bounded):
-        fine = law.effect == "cogging"
+        # Over a travel of many pitches, the phase of cogging turns by a multiple of a pitch's relative change.
+        share = 0.05 if law.effect == "cogging" else 1.0
         for factor in REFINED:
-            value = law.numbers[place] * (1 + (factor - 1) * (0.05 if fine else 1.0))
+            value = law.numbers[place] * (1 + (factor - 1) * share)
             if low <= value <= high:
                 numbers = (*law.numbers[:place], float(value), *law.numbers[place + 1 :])
                 yield replace(law, numbers=numbers)
@@ -246,22 +256,21 @@ WIDTH_ALONE = ("coulomb_friction", "condition_dependent_friction")
 
 
 def simplest_structure(search: StructureSearch) -> Structure:
-    """The structure with the fewest parameters whose cross-validated error is close to the smallest."""
+    """The fewest parameters at about the smallest error, and further laws that explain most of the rest."""
     allowed = search.best.error + PLAINER_LEAVES * (search.linear.error - search.best.error)
     enough = [each for each in search.ranked if each.error <= allowed]
     plain = min(
         enough, key=lambda each: (count_parameters(search.regression, each.laws), each.error), default=search.linear
     )
-    ceiling = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
-    while (richer := _add_further_laws(search, plain, ceiling)) is not None:
+    least_error = fit_all_laws(search.regression, range(search.regression.columns[0].shape[1]))[0]
+    while (richer := _add_further_laws(search, plain, least_error)) is not None:
         plain = richer
     return plain
 
 
-def _add_further_laws(search: StructureSearch, plain: Structure, ceiling: float) -> Structure | None:
-    """The structure with further laws that explain most of what all laws together could still explain; None = none
-    such."""
-    allowed = plain.error - max(FURTHER_LAW_OF_REST * (plain.error - ceiling), FURTHER_LAW_OF_ALL * plain.error)
+def _add_further_laws(search: StructureSearch, plain: Structure, least_error: float) -> Structure | None:
+    """The structure with further laws that explain most of what all laws (least_error) could; None = none such."""
+    allowed = plain.error - max(FURTHER_LAW_OF_REST * (plain.error - least_error), FURTHER_LAW_OF_ALL * plain.error)
     more = [
         each
         for each in search.ranked

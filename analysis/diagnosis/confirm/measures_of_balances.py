@@ -1,4 +1,9 @@
-"""The error measures by the parameters of force balances: for the laws that they name, and where they name none."""
+"""Error measures with linear parameters from the force balances, in place of those of the model fitted to spectra.
+
+A measure says how a model is compared with a recording (free simulation, windows, predicted force) and in which band.
+Where the balances name laws, several measures are tried in which these may be confirmed; where they name none, the
+balances' linear model is taken if it leaves less of the forces than the fitted one.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -25,9 +30,12 @@ BALANCE_LEAVES_LESS = (
 def list_fitting_measures(
     recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance], compared: Compared
 ) -> Iterator[FittingMeasure]:
-    """The measures to try, the strictest first: a free simulation where the fitted model allows one; then forces along
-    the measured motion with the balance's linear parameters, in the band where noise is small, if it holds the laws'
-    power, and in the band of the balance."""
+    """The measures to try for the laws that the balances name, the strictest first; none where none is named.
+
+    First a free simulation, or windows of one, where the fitted model allows it. Then forces along the measured motion
+    with the balances' linear parameters: in the band where noise is small, if that holds most of the laws' power, and
+    in the band of the balances. compared: what the user wants compared, which leaves out the others.
+    """
     if not any(balance.named for balance in balances):
         return
     chosen = measure_of(recordings, model)
@@ -39,44 +47,46 @@ def list_fitting_measures(
     if compared == "motion":
         return
     try:
-        reduced, rigid = _model_of_balances(recordings, balances, model.name)
-        if rigid is not None:
-            narrow = measure_by_force(reduced, rigid, None)
-            held = share_within(balances, narrow.measure.band_hz) if isinstance(narrow.measure, PredictedForce) else 0.0
-            if held >= LAWS_WITHIN:
-                yield FittingMeasure(rigid, narrow, narrow=True)
-            yield FittingMeasure(
-                rigid, measure_by_force(reduced, rigid, balances[0].search.regression.motions[0].band_hz)
-            )
+        reduced, linear = _model_of_balances(recordings, balances, model.name)
+        if linear is not None:
+            narrow = measure_by_force(reduced, linear, None)
+            inside = 0.0
+            if isinstance(narrow.measure, PredictedForce):
+                inside = share_within(balances, narrow.measure.band_hz)
+            if inside >= LAWS_WITHIN:
+                yield FittingMeasure(linear, narrow, narrow=True)
+            band_hz = balances[0].search.regression.motions[0].band_hz
+            yield FittingMeasure(linear, measure_by_force(reduced, linear, band_hz))
     except (MechanicalModelError, np.linalg.LinAlgError):
-        return
+        return  # the balances' parameters make no model, or none that can be inverted: nothing more can be tried
 
 
 def choose_plain_forces(
     recordings: Sequence[Recording], fitting: FittingMeasure, balances: Sequence[Balance]
 ) -> FittingMeasure:
-    """Where forces are compared and no law is named: the balance's own linear parameters in place of the fitted
-    model's, where these leave more of the forces, on the samples to fit and to choose by. A model that was fitted to
-    spectra in closed loop may need modes that the measured motions of a second body make unnecessary."""
-    measure = fitting.chosen.measure
+    """The measure with the balances' own linear parameters, where forces are compared, no law is named, and these leave
+    less of the forces than the fitted model, on the samples to fit and to choose by; else `fitting` as it is. A model
+    that was fitted to spectra in closed loop may need modes that the measured motions of a second body make
+    unnecessary."""
+    given = fitting.chosen.measure
     named, first = any(balance.named for balance in balances), recordings[0]
     if not balances or named or is_quasi_static(first) or is_read_as_free(first):
         return fitting
-    if not isinstance(measure, PredictedForce):
+    if not isinstance(given, PredictedForce):
         return fitting
     try:
-        reduced, plain = _model_of_balances(recordings, balances, fitting.model.name)
-        if plain is None:
+        reduced, linear = _model_of_balances(recordings, balances, fitting.model.name)
+        if linear is None:
             return fitting
-        chosen = _predict_about_mean(reduced, plain, measure.band_hz)
+        chosen = _predict_about_mean(reduced, linear, given.band_hz)
     except (MechanicalModelError, np.linalg.LinAlgError):
         return fitting
-    other = chosen.measure
-    if not isinstance(other, PredictedForce) or not _leaves_less((plain, other), (fitting.model, measure)):
+    measure = chosen.measure
+    if not isinstance(measure, PredictedForce) or not _leaves_less((linear, measure), (fitting.model, given)):
         return fitting
     remarks = tuple(remark for remark in fitting.chosen.remarks if remark != ABOUT_MEAN)
     chosen = replace(chosen, remarks=(*remarks, BALANCE_LEAVES_LESS))
-    return FittingMeasure(plain, chosen, is_reduced=is_reduced(balances))
+    return FittingMeasure(linear, chosen, is_reduced=is_reduced(balances))
 
 
 def _model_of_balances(
@@ -96,20 +106,22 @@ def _predict_about_mean(recordings: Sequence[Recording], model: MechanicalModel,
 
 
 Prediction = tuple[MechanicalModel, PredictedForce]
+"""A model, and the measure by which its forces are compared."""
 
 
-def _leaves_less(plain: Prediction, given: Prediction) -> bool:
-    """Whether the forces that a model needs are closer to the commands than another's, in the rms over the axes, each
-    over the rms of its command, on the samples to fit and to choose by of both."""
+def _leaves_less(linear: Prediction, given: Prediction) -> bool:
+    """Whether the forces that the first model needs are closer to the commands than the second's: the mean over the
+    axes of the error's power over the command's, on the samples to fit and to choose by of both."""
     kept = [
         (ours.fit | ours.choose) & (other.fit | other.choose)
-        for ours, other in zip(plain[1].records, given[1].records, strict=True)
+        for ours, other in zip(linear[1].records, given[1].records, strict=True)
     ]
-    forces = np.vstack([record.command[mask] for record, mask in zip(given[1].records, kept, strict=True)])
-    size = np.sqrt(np.mean(forces**2, axis=0))
-    driven = size > 0
-    missed = []
-    for model, measure in (plain, given):
-        left = [each[mask] for each, mask in zip(measure.residuals(model, ()), kept, strict=True)]
-        missed.append(np.mean((np.vstack(left) * measure.unit)[:, driven] ** 2 / size[driven] ** 2))
-    return bool(missed[0] < missed[1])
+    commands = np.vstack([record.command[mask] for record, mask in zip(given[1].records, kept, strict=True)])
+    power = np.mean(commands**2, axis=0)
+    driven = power > 0
+    shares = []
+    for model, measure in (linear, given):
+        parts = [part[mask] for part, mask in zip(measure.residuals(model, ()), kept, strict=True)]
+        errors = np.vstack(parts) * measure.unit
+        shares.append(np.mean(errors[:, driven] ** 2 / power[driven]))
+    return bool(shares[0] < shares[1])

@@ -1,5 +1,9 @@
-"""Decides by the error on held-out samples which effects of a search stay named where the model was fitted to the same
-recordings."""
+"""Decides which effects of a search stay named where the model was fitted to the same recordings.
+
+Such a model has absorbed what it could of a missing law, and another law may stand in for the rest. So an effect must
+take a notable share of the held-out error power, as laws of a force balance must; effects of actuator and sensor become
+candidates, unless the signal itself shows them.
+"""
 
 from dataclasses import replace
 
@@ -15,7 +19,7 @@ from analysis.diagnosis.settings import FURTHER_LAW_OF_ALL
 
 CONSTANT = "constant_force"
 CONSTANTS = {CONSTANT: "force", "sensor_offset": "offset"}
-"""Effects that are parameters of a fitted model, and their values."""
+"""Effects that a fitted model may hold as parameters, which are no missing physics; and the names of their values."""
 SHOWN_BY_SIGNAL = ("sensor_clipping", "quantization", "mains_hum", "lost_samples")
 """Effects of a sensor that can be seen in its signal alone."""
 ONLY_BESIDE_CALIBRATION = (
@@ -30,8 +34,9 @@ BESIDE_DIVERGENCE = (
 
 
 def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
-    """The result with only those effects named that take as much of the held-out error power as a law of a balance
-    must, and `explained` only where repeats show the noise. Constants are parameters of the model and need no test."""
+    """The result with only those effects that take as much of the held-out error power as a law of a balance must: the
+    last is removed until one does. repeats: whether repeated periods show the noise; without them no verdict is
+    `explained`, because no error is known to be noise alone. Constants are parameters of the model and need no test."""
     found = result.found
     while found.steps and not _takes_enough(result.context, found):
         found = without_effect(result.context, found, len(found.steps) - 1)
@@ -43,26 +48,30 @@ def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
 
 
 def _takes_enough(context: SearchContext, found: Explanation) -> bool:
-    """Whether the last effect takes a notable share of the held-out error power beside those before it."""
+    """Whether the last effect takes a notable share of the held-out error power beside those before it. True where
+    nothing is held out: both errors are then infinite."""
     before = context.with_test_score(found.steps[-2]) if len(found.steps) > 1 else found.plain
+    # Of logarithms of rms errors: half of that of the error power.
     return not found.after.held_out > before.held_out + np.log(1 - FURTHER_LAW_OF_ALL) / 2
 
 
 def unname_doubtful_effects(result: SearchResult) -> SearchResult:
     """The result with named effects of actuator and sensor made candidates, unless the signal itself shows them: the
     model was fitted to these recordings, so that a law of the motion that the catalogue lacks may look like a nonlinear
-    or late sensor. What the signal shows is a candidate, too, where the model without it predicts nothing."""
-    found, demoted = result.found, []
-    doubtful = [place for place, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
-    if len(doubtful) < len(found.steps) and not predicts_something(result.context.whole, found.plain):
+    or late sensor. What the signal shows is a candidate, too, where the model without it predicts nothing. A candidate
+    is reported with the gain of all effects up to it, if that is positive on the held-out samples."""
+    found, context, candidates = result.found, result.context, []
+    doubtful = [number for number, step in enumerate(found.steps) if step.newest not in SHOWN_BY_SIGNAL]
+    if len(doubtful) < len(found.steps) and not predicts_something(context.whole, found.plain):
         doubtful = list(range(len(found.steps)))
-    for place in reversed(doubtful):
-        gain = held_out_gain(result.context.whole, found.plain, result.context.with_test_score(found.steps[place]))
-        if gain is not None and gain.gain > 0:
-            why_not = BESIDE_DIVERGENCE if found.steps[place].newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
-            demoted.append(Unconfirmed(found.steps[place].fitted.hypothesis, gain.gain, why_not))
-        found = without_effect(result.context, found, place)
     if not doubtful:
         return result
-    kept = tuple(sorted(demoted, key=lambda each: -each.gain))
-    return replace(result, found=found, judgement=judge(found), errors=None, unconfirmed=(*result.unconfirmed, *kept))
+    for number in reversed(doubtful):  # the last first: the numbers of those before it stay
+        step = found.steps[number]
+        gain = held_out_gain(context.whole, found.plain, context.with_test_score(step))
+        if gain is not None and gain.gain > 0:
+            why_not = BESIDE_DIVERGENCE if step.newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
+            candidates.append(Unconfirmed(step.fitted.hypothesis, gain.gain, why_not))
+        found = without_effect(context, found, number)
+    ranked = tuple(sorted(candidates, key=lambda each: -each.gain))
+    return replace(result, found=found, judgement=judge(found), errors=None, unconfirmed=(*result.unconfirmed, *ranked))

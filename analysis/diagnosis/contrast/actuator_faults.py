@@ -1,4 +1,15 @@
-"""Faults of an actuator, each as the change of the recorded command that undoes it."""
+"""Faults of an actuator, each as the change of the recorded command that undoes it.
+
+A recording holds the command u that was sent; a faulty actuator delivered a force g(u) instead. The faulty recording is
+explained by the sound device where u is replaced by g(u): "undoing" a fault therefore means to put the delivered force
+in the place of the command. The laws g, with `size` 1 as given and other sizes by interpolation of u and g(u):
+
+    force_gain        2 u                            force_offset      u + rms(u)
+    force_gain_drift  u (1 + ramp to 1 at the end)   actuator_cubic    u + u^3 / max(u)^2
+    transport_delay   u(t - T)                       amplifier_lag     u / (T s + 1)
+    force_saturation  u clipped to +-limit           slew_limit        u with |du/dt| <= rate
+    force_deadband    sgn(u) max(|u| - width, 0)
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +36,7 @@ from equalizer.signals.signal import FloatArray
 CommandChange = Callable[[FloatArray, float], FloatArray]
 """Maps one axis's command (n,), at a rate in Hz, to the force of the faulty actuator."""
 AROUND = (0.75, 1.35)
-"""Range of sizes over which the change for size 1 may be scaled."""
+"""Range of sizes in which a change that is nonlinear in its size may be scaled before it is linearised anew."""
 GRID = 12
 """Number of sizes that are tried for faults which are nonlinear in their size, on a logarithmic grid."""
 BEGUN = (0.0, 0.25, 0.5)
@@ -42,12 +53,12 @@ class _Axis:
     def fault(self, effect: str, variants: Sequence[Variant]) -> Fault:
         return Fault(effect, "actuator", self.name, self.number, tuple(variants))
 
-    def undo_by(self, made: CommandChange) -> Undo:
-        """The function that replaces this axis's command by the force which the faulty actuator made of it."""
+    def undo_by(self, delivered: CommandChange) -> Undo:
+        """The function that replaces this axis's command by the force that the faulty actuator delivered."""
 
         def undo(part: Part) -> Part:
             command = part.command.copy()
-            command[:, self.number] = made(command[:, self.number], part.rate_hz)
+            command[:, self.number] = delivered(command[:, self.number], part.rate_hz)
             return replace(part, command=command)
 
         return undo
@@ -57,9 +68,9 @@ def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: boo
     """All faults of the actuator of axis `number`. parts: all compared ones, whose range the grids span. by_force:
     whether the base predicts the command, not the response."""
     axis = _Axis(number, name)
-    whole = np.concatenate([part.command[:, number] for part in parts])
-    top = float(np.abs(whole).max(initial=0.0)) or 1.0
-    rms = float(np.std(whole)) or top
+    commands = np.concatenate([part.command[:, number] for part in parts])
+    top = float(np.abs(commands).max(initial=0.0)) or 1.0
+    rms = float(np.std(commands)) or top
     yield from _gains(axis, by_force)
     yield axis.fault(
         "force_offset", [Variant((axis.undo_by(lambda u, rate: u + rms),), proportional_parameter("offset", rms))]
@@ -73,7 +84,7 @@ def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: boo
         *(replace(fix_size(_delay(axis, time_s), rows.late_step_s), column_change=None) for time_s in rows.late_s),
     ])  # fmt: skip
     yield axis.fault("amplifier_lag", [_lag(axis, time_s) for time_s in times])
-    shares = np.quantile(np.abs(whole), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / top
+    shares = np.quantile(np.abs(commands), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / top
     limits = sorted(top * share for share in (*shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
     yield axis.fault("force_saturation", [_saturation(axis, limit) for limit in limits])
     fastest = max(float(np.abs(np.diff(part.command[:, number])).max(initial=0.0)) * part.rate_hz for part in parts)
@@ -85,7 +96,8 @@ def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: boo
 
 
 def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
-    """Faults of the gain. The size scales the predicted command in a force balance, and else the force made of it."""
+    """Faults of the gain. Their size s scales what predicts the command in a force balance, so that the gain is
+    1 / (1 + s), and the delivered force elsewhere, so that it is 1 + s."""
 
     def gain(size: float) -> float:
         return 1 / (1 + size) if by_force else 1 + size
@@ -100,8 +112,9 @@ def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
 
 def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
     def ramp(part: Part, count: int) -> FloatArray:
-        passed = 1 + drift_shape(part, begun)
-        return np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(passed)), passed)[:, None]
+        """(count, 1): the gain at `count` evenly spaced times of a part, as rows may be decimated."""
+        gain = 1 + drift_shape(part, begun)
+        return np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(gain)), gain)[:, None]
 
     def undo(part: Part) -> Part:
         command = part.command.copy()
@@ -117,6 +130,7 @@ def drift_shape(part: Part, begun: float) -> FloatArray:
 
 
 def _delay(axis: _Axis, time_s: float) -> Variant:
+    # The command at t shows in the motion at t + T.
     change: ColumnChange = lambda x, rate, part: shift_samples(x, -time_s * rate)  # noqa: E731
 
     def undo(part: Part) -> Part:
@@ -130,6 +144,7 @@ def _delay(axis: _Axis, time_s: float) -> Variant:
 
 
 def _lag(axis: _Axis, time_s: float) -> Variant:
+    # The command is (1 + T s) times the delivered force.
     undo = axis.undo_by(lambda u, rate: apply_lag(u, time_s * rate))
     change: ColumnChange = lambda x, rate, part: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
     about = lambda size: _lag(axis, size * time_s)  # noqa: E731
@@ -156,21 +171,21 @@ def delays_to_try(samples: FloatArray, rate_hz: float) -> list[float]:
     shortest, longest = 0.1 / rate_hz, LONGEST_DELAY / median_frequency_hz(samples, rate_hz)
     if longest <= shortest:
         return []
-    # The ranges `AROUND` neighbouring sizes overlap.
+    # So many that the ranges `AROUND` neighbouring delays overlap.
     count = int(np.ceil(np.log(longest / shortest) / np.log(AROUND[1] / AROUND[0]))) + 1
     return [float(time_s) for time_s in np.geomspace(shortest, longest, max(count, GRID))]
 
 
 def median_frequency_hz(samples: FloatArray, rate_hz: float) -> float:
-    """The frequency in Hz below which half of the power lies."""
+    """The frequency in Hz below which half of the power of samples (n,) about their mean lies; at least one line."""
     power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
     line = int(np.searchsorted(np.cumsum(power), 0.5 * power.sum()))
     return max(line, 1) * rate_hz / len(samples)
 
 
 def apply_lag(samples: FloatArray, constant: float) -> FloatArray:
-    """Samples (n,) through a low pass of the first order. constant: time constant in samples."""
-    share = 1 - np.exp(-1 / constant)
-    passed = np.empty((len(samples), 1))
-    filter_one_pole((samples - samples[0])[:, None], 1 - share, passed)
-    return np.asarray(samples[0] + passed[:, 0])
+    """Samples (n,) through a low pass of the first order, from the steady state of the first sample. constant: time
+    constant in samples, above 0."""
+    low_passed = np.empty((len(samples), 1))
+    filter_one_pole((samples - samples[0])[:, None], float(np.exp(-1 / constant)), low_passed)
+    return np.asarray(samples[0] + low_passed[:, 0])

@@ -1,6 +1,10 @@
-"""Base model by autoregression: each response is predicted from the past of responses and commands (ARX; Ljung, System
-Identification, 2nd ed., chapter 4.2). Used for devices that no force balance describes: voltages as responses, many
-modes."""
+"""Base model by autoregression (ARX; Ljung, System Identification, 2nd ed., section 4.2): each response is predicted
+from the past of all responses y and of all commands u,
+
+    y_i(t) = sum over k = 1..n of a_k' y(t - k) + sum over k = 0..n of b_k' u(t - k) + c + e(t).
+
+Used for devices that no force balance describes: voltages as responses, many modes.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,20 +22,23 @@ from equalizer.signals.signal import FloatArray
 class AutoregressiveBase:
     """One response. Rows are its second difference, then the past of all responses and commands, and 1.
 
-    The past is given as the last value, its difference, and second differences: products of smooth readings are nearly
-    equal, so that in double precision errors below 1e-5 of them would be lost to rounding.
+    The past of the responses is given as y(t - 1), its first difference, and second differences up to lag n - 2, which
+    span the same space as y(t - 1) to y(t - n): products of smooth readings are nearly equal, so that in double
+    precision errors below 1e-5 of them would be lost to rounding.
     """
 
     channel: int
+    """The response that is predicted."""
     order: int
-    """Number of past samples of responses and commands that predict."""
+    """n: number of past samples of responses and commands that predict, in decimated samples; at least 2."""
     step: int
     """Decimation step, after a low pass."""
     responses: int
     """Number of response channels."""
 
     def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
-        """Per part (kept, 1 + columns), from the sample of index `order` on after decimation. `like` is not used."""
+        """Per part (n, 1 + columns), the prediction of every decimated sample from the order on. like: not used; a
+        force balance reuses columns of it."""
         return tuple(self._rows(part) for part in parts)
 
     def command_columns(self, width: int) -> Mask:
@@ -39,14 +46,17 @@ class AutoregressiveBase:
         return (np.arange(width) > self.order * self.responses) & (np.arange(width) < width - 1)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
-        """Per part, mask of its rows: those made from known samples, without the first two and the last two."""
+        """Per part (n,): mask of the rows whose own and past samples are known, without the first two and the last two. A
+        sample that was lost between those that decimation keeps is interpolated and low-passed with its neighbours, and
+        does not count as lost."""
         found = []
         for part in parts:
             known = part.known[:: self.step]
-            bad = np.convolve(~known, np.ones(self.order + 3))[: len(known)] > 0
-            bad[: self.order + 2] = True
-            bad[len(bad) - 2 :] = True
-            found.append(~bad[self.order :])
+            # A row reaches back over `order` samples; two more are a margin beside gaps and ends.
+            invalid = np.convolve(~known, np.ones(self.order + 3))[: len(known)] > 0
+            invalid[: self.order + 2] = True
+            invalid[len(invalid) - 2 :] = True
+            found.append(~invalid[self.order :])
         return tuple(found)
 
     def _rows(self, part: Part) -> FloatArray:
@@ -55,13 +65,13 @@ class AutoregressiveBase:
         first = np.diff(response, axis=0, prepend=response[:1])
         second = np.diff(first, axis=0, prepend=first[:1])
 
-        def before(samples: FloatArray, lag: int) -> FloatArray:
+        def lagged(samples: FloatArray, lag: int) -> FloatArray:
             return samples[self.order - lag : self.order - lag + count]
 
-        past = [before(second, lag) for lag in range(1, self.order - 1)]
-        pushed = [before(command, lag) for lag in range(self.order + 1)]
-        now = before(second[:, [self.channel]], 0)
-        return np.hstack([now, before(response, 1), before(first, 1), *past, *pushed, np.ones((count, 1))])
+        responses = [lagged(second, lag) for lag in range(1, self.order - 1)]
+        commands = [lagged(command, lag) for lag in range(self.order + 1)]
+        predicted = lagged(second[:, [self.channel]], 0)
+        return np.hstack([predicted, lagged(response, 1), lagged(first, 1), *responses, *commands, np.ones((count, 1))])
 
     def values(self, rows: FloatArray) -> FloatArray:
         """(n,): the response itself: its second difference, the value before, and the difference before."""
@@ -69,23 +79,22 @@ class AutoregressiveBase:
 
 
 def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
-    """(n / step, k): every `step`-th sample, low-pass filtered to 0.4 times the new rate before."""
+    """(n / step, k): every `step`-th sample, low-pass filtered to 0.4 times the new rate before (anti-aliasing)."""
     return samples if step == 1 else low_pass_filter(samples, rate_hz, 0.4 * rate_hz / step)[::step]
 
 
 def likely_step(parts: Sequence[Part]) -> int:
     """Decimation step that keeps the band of the fastest response: the part of its spectrum with the share
-    `RESPONSE_BAND_SHARE` of the power above the noise."""
-    ends = []
+    `RESPONSE_BAND_SHARE` of the power above the noise floor. That is the median power of the upper quarter of the
+    spectrum."""
+    ends_hz = []
     for part in parts:
-        moved = part.response - part.response.mean(axis=0)
-        power = np.abs(np.fft.rfft(moved, axis=0)) ** 2
+        line_hz = part.rate_hz / len(part.response)
+        power = np.abs(np.fft.rfft(part.response - part.response.mean(axis=0), axis=0)) ** 2
         for column in power.T:
             floor = float(np.median(column[3 * len(column) // 4 :]))
             cumulative = np.cumsum(np.maximum(column - floor, 0.0))
             if cumulative[-1] > 0:
-                ends.append(
-                    int(np.searchsorted(cumulative, RESPONSE_BAND_SHARE * cumulative[-1])) * part.rate_hz / len(moved)
-                )
-    fastest = max(ends, default=parts[0].rate_hz / 2)
-    return max(int(parts[0].rate_hz / (RESPONSE_OVERSAMPLED * 2 * max(fastest, 1e-9))), 1)
+                ends_hz.append(int(np.searchsorted(cumulative, RESPONSE_BAND_SHARE * cumulative[-1])) * line_hz)
+    fastest_hz = max(ends_hz, default=parts[0].rate_hz / 2)
+    return max(int(parts[0].rate_hz / (RESPONSE_OVERSAMPLED * 2 * max(fastest_hz, 1e-9))), 1)

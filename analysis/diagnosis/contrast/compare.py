@@ -1,5 +1,16 @@
-"""Tests each fault: the error that undoing it removes between faulty and clean recordings, compared with the error that
-it removes between stretches of one set, because no real device repeats itself exactly."""
+"""Tests which fault explains the difference between faulty and clean recordings of one device.
+
+With E(f) the sum of squared whitened errors of one base that is fitted to both sets at once, with fault f undone in the
+faulty set (`compared_base`, `joint_products`), the gain of f is
+
+    gain(f) = E(none) / E(f) - 1.
+
+No real device repeats itself exactly, and a flexible fault gains a little anywhere. As negative control, the same gain
+is therefore computed between stretches of one set, where no fault can have come or gone; the median of these gains is
+subtracted. A confidence bound of the rest comes from resampling blocks (bootstrap), standard errors of a fault's values
+from leaving out blocks in turn (delete-a-group jackknife; Efron and Tibshirani, An Introduction to the Bootstrap, 1993,
+chapter 11).
+"""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -47,8 +58,9 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (len(ALL) // 6, len(ALL) // 3))
+"""Consecutive blocks of a set."""
 FOLDS = len(SIXTHS)
-"""Parts of each set that are left out in turn (jackknife)."""
+"""Groups of blocks of each set that are left out in turn (jackknife)."""
 APART = (*THIRDS, ALL[: CONTRAST_BLOCKS // 2])
 """Blocks of a set that are compared with its other blocks, thirds and halves, as if they were separate recordings."""
 
@@ -73,11 +85,14 @@ def compare(
 def _set_up(
     clean: tuple[Part, ...], faulty: tuple[Part, ...], bases: Sequence[Base], motions: tuple[Motion, ...]
 ) -> tuple[list[ComparedBase], list[Fault]]:
+    """The bases on both sets, with those of one sensor by another, and all faults that the recordings may have. Faults
+    of the mechanism need velocities, and so a time axis; where the motion was imposed, no actuator made it."""
     recording = clean[0].recording
     by_force = isinstance(bases[0], ForceBase)
     timed = bool(motions) and np.isfinite(motions[0].band_hz)
     band_hz, step = (motions[0].band_hz, motions[0].step) if motions else (np.inf, 1)
-    table = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
+    # `motions` is empty where none was measured.
+    motion_of = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
     compared_bases = [compare_base(base, clean, faulty) for base in bases]
     for base in sensor_bases(clean, band_hz, step):
         with suppress(ValueError):  # too few valid rows: the other bases are compared
@@ -89,7 +104,7 @@ def _set_up(
     turns = is_rotational(recording)
     for axis, name in enumerate(recording.command.channels):
         if timed:
-            faults += mechanism_faults(axis, name, motions, lambda part: table[id(part.recording)], turns)
+            faults += mechanism_faults(axis, name, motions, lambda part: motion_of[id(part.recording)], turns)
         if not recording.meta.get("imposed"):
             faults += actuator_faults(axis, name, (*clean, *faulty), by_force, rows)
     for channel, name in enumerate(recording.response.channels):
@@ -104,39 +119,46 @@ def _set_up(
 def _judge_faults(compared_bases: Sequence[ComparedBase], trial: TriedFaults) -> Comparison:
     bare = trial.bare
     plain = fit_sizes(bare, None)
-    own = sum(compared.faulty.count for compared in compared_bases)
-    samples = own + sum(compared.clean.count for compared in compared_bases)
-    weighed = sorted(
+    faulty_samples = sum(compared.faulty.count for compared in compared_bases)
+    samples = faulty_samples + sum(compared.clean.count for compared in compared_bases)
+    judged = sorted(
         (_judge_fault(compared_bases, found, plain, samples) for found in trial.tried),
         key=lambda each: float(each.errors.sum()),
     )
-    apart = zip(SIXTHS, _leave_out_blocks(bare), strict=True)
-    held = sum(held_out_error(kept, np.zeros(0), out) for out, kept in apart)
-    blocks = [pair.without for pair in bare], [pair.with_it.blocks for pair in bare]
-    usual = [max(_excesses_within_a_set([np.array(products) for products in side])) for side in blocks]
+    folds = zip(SIXTHS, _leave_out_sixths(bare), strict=True)
+    held_out = sum(held_out_error(kept, np.zeros(0), out) for out, kept in folds)
+    clean, faulty = [pair.without for pair in bare], [pair.with_it.blocks for pair in bare]
+    usual = [max(_excesses_within_a_set([np.array(products) for products in side])) for side in (clean, faulty)]
     first = compared_bases[0]
     return Comparison(
-        tuple(weighed), plain.errors, samples, own, held, min(unexplained_share(first.base, first.faulty.parts), 1.0),
-        max(usual), usual[0], isinstance(first.base, ForceBase), first.row_s, trial.complete,
-    )  # fmt: skip
+        faults=tuple(judged),
+        plain=plain.errors,
+        samples=samples,
+        faulty_samples=faulty_samples,
+        held_out=held_out,
+        faulty_share=min(unexplained_share(first.base, first.faulty.parts), 1.0),
+        usual=max(usual),
+        usual_clean=usual[0],
+        by_force=isinstance(first.base, ForceBase),
+        step_s=first.row_s,
+        complete=trial.complete,
+    )
 
 
 def _balances(compared_bases: Sequence[ComparedBase], tried: Sequence[TriedVariant]) -> bool:
     """Whether the force balance fits the faulty set, with nothing or with the best fault undone. tried: the best
     first."""
-    device = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
-    if all(
-        unexplained_share_of_rows(each.base, each.faulty.rows, each.faulty.masks) < BALANCE_HOLDS for each in device
-    ):
+    axes = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
+    if all(unexplained_share_of_rows(each.base, each.faulty.rows, each.faulty.masks) < BALANCE_HOLDS for each in axes):
         return True
     return any(
-        all(unexplained_share_of_rows(each.base, *_undo(each, found)) < BALANCE_HOLDS for each in device)
+        all(unexplained_share_of_rows(each.base, *_undo(each, found)) < BALANCE_HOLDS for each in axes)
         for found in tried[:1]
     )
 
 
 def _undo(compared: ComparedBase, found: TriedVariant) -> tuple[list[FloatArray], list[Mask]]:
-    """The rows of the faulty set with a fault undone, and those of which something is left."""
+    """Rows of the faulty set with a fault undone at its fitted sizes, and masks of those with known values."""
     fit, fault, variant, _ = found
     changed = rows_with_fault_undone(compared, compared.faulty, fault, variant)
     rows, masks = list(compared.faulty.rows), list(compared.faulty.masks)
@@ -147,31 +169,27 @@ def _undo(compared: ComparedBase, found: TriedVariant) -> tuple[list[FloatArray]
 
 
 def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
-    """Ratio of the errors of a common base to those of separate bases for stretches of one set, less 1. sides: per
-    compared, products (blocks, k, k)."""
+    """For each division of one set into two stretches: the error of a base for both over that of a base for each, less
+    1. sides: per base, the set's products (blocks, k, k)."""
 
     def error(blocks: Sequence[int]) -> float:
         return sum(error_of_own_fit(side[list(blocks)].sum(axis=0)) for side in sides)
 
     together = error(ALL)
-    for at in APART:
-        apart = error(at) + error([block for block in ALL if block not in at])
-        yield together / max(apart, 1e-300) - 1
+    for stretch in APART:
+        separate = error(stretch) + error([block for block in ALL if block not in stretch])
+        yield together / max(separate, 1e-300) - 1
 
 
 def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, plain: Fit, samples: int) -> JudgedFault:
+    """The fault with its values and their standard errors, its gain, and its gains where it cannot be: between
+    stretches of one set. plain: the fit with nothing undone. samples: of both sets, over all bases."""
     fit, fault, variant, pairs = found
     values = variant.values(fit.sizes)
-    apart = _leave_out_blocks(pairs)
-    fits = [fit_sizes(kept, variant) for kept in apart]
-    sides = [[variant.values(fit.sizes) for fit in fits], _values_without_clean_blocks(pairs, variant)]
-    held = sum(held_out_error(kept, each.sizes, out) for out, kept, each in zip(SIXTHS, apart, fits, strict=True))
-    spread = {
-        name: float(
-            np.sqrt(variant.grid_error**2 + sum(_jackknife_variance([o[name] for o in side]) for side in sides))
-        )
-        for name in values
-    }
+    folds = _leave_out_sixths(pairs)
+    fits = [fit_sizes(kept, variant) for kept in folds]
+    held_out = sum(held_out_error(kept, each.sizes, out) for out, kept, each in zip(SIXTHS, folds, fits, strict=True))
+    # The control takes long, and a fault without a gain needs none.
     gains = (
         list(_gains_within_a_set(compared_bases, fault, allowed_sizes(variant), fit.sizes))
         if plain.error > (1 + LEAST_FAULT_GAIN) * fit.error
@@ -180,30 +198,54 @@ def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, pl
     typical = max(float(np.median(gains)), 0.0)
     errors = fit.errors * (1 + typical)
     drawn = bootstrap_draws(len(errors))
-    beyond = plain.errors[drawn].sum(axis=1) / np.maximum(errors[drawn].sum(axis=1), 1e-300) - 1
-    left, room = float(errors.sum()), plain.error - samples
+    drawn_gains = plain.errors[drawn].sum(axis=1) / np.maximum(errors[drawn].sum(axis=1), 1e-300) - 1
+    # Separate bases for both sets leave white errors of rms 1, whose sum of squares is the number of samples.
+    error, excess = float(errors.sum()), plain.error - samples
     return JudgedFault(
-        fault, values, spread, errors, plain.error / max(left, 1e-300) - 1, max([0.0, *gains]) - typical, typical,
-        (plain.error - left) / room if room > 0 else 0.0, held, float(np.quantile(beyond, BOOTSTRAP_LEVEL)),
-        max(_excesses_within_a_set([pair.with_it.undo_sizes(fit.sizes) for pair in pairs])),
-    )  # fmt: skip
+        fault=fault,
+        values=values,
+        spread=_standard_errors(variant, [each.sizes for each in fits], _sizes_without_clean_sixths(pairs, variant)),
+        errors=errors,
+        gain=plain.error / max(error, 1e-300) - 1,
+        usual=max([0.0, *gains]) - typical,
+        typical=typical,
+        share=(plain.error - error) / excess if excess > 0 else 0.0,
+        held_out=held_out,
+        gain_low=float(np.quantile(drawn_gains, BOOTSTRAP_LEVEL)),
+        apart=max(_excesses_within_a_set([pair.with_it.undo_sizes(fit.sizes) for pair in pairs])),
+    )
 
 
-def _values_without_clean_blocks(pairs: Sequence[Pair], variant: Variant) -> list[dict[str, float]]:
-    """The fault's values, with each sixth of the clean set left out in turn."""
+def _standard_errors(
+    variant: Variant, without_faulty: Sequence[FloatArray], without_clean: Sequence[FloatArray]
+) -> dict[str, float]:
+    """Standard error of each value of a fault, from its sizes with each sixth of either set left out: variances of both
+    sets and of the spacing of the variants add up."""
+    sets = [[variant.values(sizes) for sizes in each] for each in (without_faulty, without_clean)]
+    return {
+        name: float(
+            np.sqrt(variant.grid_error**2 + sum(_jackknife_variance([fold[name] for fold in side]) for side in sets))
+        )
+        for name in sets[0][0]
+    }
+
+
+def _sizes_without_clean_sixths(pairs: Sequence[Pair], variant: Variant) -> list[FloatArray]:
+    """The fault's sizes, with each sixth of the clean set left out in turn."""
     kept = [
         [replace(pair, without=(*pair.without[: out[0]], *pair.without[out[-1] + 1 :])) for pair in pairs]
         for out in SIXTHS
     ]
-    return [variant.values(fit_sizes(each, variant).sizes) for each in kept]
+    return [fit_sizes(each, variant).sizes for each in kept]
 
 
 def _jackknife_variance(values: Sequence[float]) -> float:
-    """Jackknife variance of a number, from its values with each block left out."""
+    """Jackknife variance of a number, from its g values with each of g groups left out: (g - 1) / g times the sum of
+    their squared deviations."""
     return float((len(values) - 1) * np.var(values))
 
 
-def _leave_out_blocks(pairs: Sequence[Pair]) -> list[list[Pair]]:
+def _leave_out_sixths(pairs: Sequence[Pair]) -> list[list[Pair]]:
     """The pairs with each sixth of the faulty set left out in turn."""
     return [[replace(pair, at=tuple(block for block in ALL if block not in out)) for pair in pairs] for out in SIXTHS]
 
@@ -212,16 +254,17 @@ def _gains_within_a_set(
     compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant, sizes: FloatArray
 ) -> Iterator[float]:
     """The fault's gains between stretches of one set (negative control): in the clean set from size zero to the
-    stretch's own size; in the faulty set from the common size, which is undone everywhere first, because lack of fit of
-    the base would gain in any stretch."""
-    for clean in (True,) if fault.varies else (True, False):
-        common = np.zeros_like(sizes) if clean else sizes
-        sides = [compared.clean if clean else compared.faulty for compared in compared_bases]
-        both = [
+    stretch's own size; in the faulty set from the size found there, which is undone everywhere first, because lack of
+    fit of the base would gain in any stretch. A fault that varies differs between stretches of the faulty set itself,
+    which is no control then."""
+    for is_clean in (True,) if fault.varies else (True, False):
+        common = np.zeros_like(sizes) if is_clean else sizes
+        sides = [compared.clean if is_clean else compared.faulty for compared in compared_bases]
+        products = [
             compared.grams(side, rows_with_fault_undone(compared, side, fault, variant))
             for compared, side in zip(compared_bases, sides, strict=True)
         ]
-        for at in APART:
-            rest = [block for block in ALL if block not in at]
-            pairs = [Pair(grams, at, tuple(grams.undo_sizes(common)[rest])) for grams in both]
+        for stretch in APART:
+            rest = [block for block in ALL if block not in stretch]
+            pairs = [Pair(grams, stretch, tuple(grams.undo_sizes(common)[rest])) for grams in products]
             yield error_with_sizes(pairs, common) / max(fit_sizes(pairs, variant).error, 1e-300) - 1

@@ -1,19 +1,24 @@
 """One base model compared on two sets of recordings: reference (clean) and possibly faulty.
 
-A base predicts one signal from others by least squares. Its rows are whitened by the same filter (autoregression of the
-errors of both sets, Yule-Walker), so that sums of squares are log-likelihoods, and scaled to the error of each set, so
-that both count alike. A fault is tested by undoing it in the rows of one set (`rows_with_fault_undone`).
+A base predicts a signal y from regressors x, y(t) = x(t)' w + e(t); a row is (y, x). The errors are correlated in time:
+one autoregressive filter A(q) for both sets, fitted to their errors (Yule-Walker), makes them white. With s the rms of
+A e of a set whose own w is fitted, the rows A (y, x) / s give sums of squares that are -2 log-likelihoods of Gaussian
+errors but for a constant (Ljung, System Identification, 2nd ed., section 7.4), and both sets count alike.
+
+A fault is tested by undoing it in the rows of one set. Where it lies in the predicted signal itself, undoing maps y to
+g(y), and the likelihood of the y that was recorded is that of g(y) times |g'|. The errors are divided by |g'|
+therefore: otherwise a map that shrinks the signal, and with it every error, would win (`_jacobian_correction`).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
-from analysis.diagnosis.contrast.fault import EVERY, Curve, Fault, Variant
+from analysis.diagnosis.contrast.fault import EVERY, ColumnChange, Curve, Fault, Undo, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
 from analysis.diagnosis.contrast.part import Part
@@ -41,7 +46,7 @@ class RecordingSet:
     """Per part (kept, 1 + columns): what is predicted, then its predictors."""
     masks: tuple[Mask, ...]
     scale: float
-    """Rms of the whitened error of a base fitted to this set alone."""
+    """s: rms of the whitened error of a base fitted to this set alone, relative to the rms of the predicted signal."""
     white: FloatArray
     """(valid samples, 1 + columns): the rows, whitened and scaled."""
 
@@ -53,7 +58,7 @@ class RecordingSet:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UndoneRows:
-    """Rows with a fault of size 1 undone."""
+    """Rows of one set with a fault of size 1 undone."""
 
     rows: tuple[FloatArray, ...]
     lost: tuple[Mask, ...] | None = None
@@ -70,9 +75,9 @@ class ComparedBase:
     faulty: RecordingSet
     """The recordings to diagnose."""
     whitening: FloatArray
-    """Coefficients of the whitening filter of the errors."""
+    """(k,): impulse response of the whitening filter A(q); the first is 1."""
     columns: FloatArray
-    """(1 + columns,): rms of each."""
+    """(1 + columns,): rms of each column, by which the rows are divided before products are formed."""
     gap_reach: int
     """Rows beside a gap that are left out; see `_reach_of_gaps`."""
 
@@ -84,21 +89,21 @@ class ComparedBase:
 
     def grams(self, side: RecordingSet, changed: Sequence[UndoneRows]) -> Grams:
         """Products of a side's rows and of their changes by undone faults; see `Grams`."""
-        moved = [_changed_columns(each.rows, side.rows) for each in changed]
-        kept = np.hstack([side.white, *(self._changes(side, *each) for each in zip(changed, moved, strict=True))])
+        which = [_changed_columns(each.rows, side.rows) for each in changed]
+        joined = np.hstack([side.white, *(self._changes(side, *each) for each in zip(changed, which, strict=True))])
         return Grams(
-            np.array([block.T @ block for block in np.array_split(kept, CONTRAST_BLOCKS)]),
-            tuple(moved),
+            np.array([block.T @ block for block in np.array_split(joined, CONTRAST_BLOCKS)]),
+            tuple(which),
             len(self.columns),
         )
 
     def _changes(self, side: RecordingSet, undone: UndoneRows, at: Places) -> FloatArray:
         """(valid samples, k): the changes of the columns `at`, whitened."""
         differences = [part[:, at] - plain[:, at] for part, plain in zip(undone.rows, side.rows, strict=True)]
-        found = _whiten(self.whitening, differences, side.masks) / (self.columns[at] * side.scale)
+        white = _whiten(self.whitening, differences, side.masks) / (self.columns[at] * side.scale)
         if undone.lost is not None:
-            found[np.concatenate([gone[mask] for gone, mask in zip(undone.lost, side.masks, strict=True)])] = 0.0
-        return np.asarray(found)
+            white[np.concatenate([gone[mask] for gone, mask in zip(undone.lost, side.masks, strict=True)])] = 0.0
+        return np.asarray(white)
 
 
 def _whiten(whitening: FloatArray, rows: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
@@ -106,10 +111,11 @@ def _whiten(whitening: FloatArray, rows: Sequence[FloatArray], masks: Sequence[M
     return np.concatenate([apply_filter(whitening, part)[mask] for part, mask in zip(rows, masks, strict=True)])
 
 
-def apply_filter(steps: FloatArray, samples: FloatArray) -> FloatArray:
-    """(n, k): samples through a finite impulse response `steps`, from rest."""
-    room = next_fast_len(len(samples) + len(steps) - 1, True)
-    return np.asarray(irfft(rfft(samples, room, axis=0) * rfft(steps, room)[:, None], room, axis=0)[: len(samples)])
+def apply_filter(impulse_response: FloatArray, samples: FloatArray) -> FloatArray:
+    """(n, k): samples through a filter with a finite impulse response, from rest."""
+    length = next_fast_len(len(samples) + len(impulse_response) - 1, True)  # a linear, not a circular, convolution
+    product = rfft(samples, length, axis=0) * rfft(impulse_response, length)[:, None]
+    return np.asarray(irfft(product, length, axis=0)[: len(samples)])
 
 
 def _changed_columns(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) -> Places:
@@ -119,8 +125,8 @@ def _changed_columns(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) ->
 
 
 def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> ComparedBase:
-    """The base fitted to both sets, whitened and scaled. Raises ValueError where too few rows of a set are left,
-    numpy.linalg.LinAlgError where no base can be fitted."""
+    """Both sets as whitened and scaled rows of a base. Raises ValueError where too few rows of a set are left,
+    numpy.linalg.LinAlgError where the base cannot be fitted."""
     if isinstance(base, AutoregressiveBase):
         least = (base.order + 2 * REACH) * base.step
         clean, faulty = ([part for part in parts if len(part.known) > least] for parts in (clean, faulty))
@@ -131,8 +137,8 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
     fewest = max(FEWEST_ROWS, 2 * rows[0][0].shape[1])
     if any(sum(int(mask.sum()) for mask in side) < fewest for side in masks):
         raise ValueError("too few rows are left of one set to be compared by")
-    everything = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
-    columns = np.sqrt(np.mean(everything**2, axis=0))
+    all_rows = np.vstack([part[mask] for side in (0, 1) for part, mask in zip(rows[side], masks[side], strict=True)])
+    columns = np.sqrt(np.mean(all_rows**2, axis=0))
     columns = np.where(columns > 0, columns, 1.0)
     residuals = [_residuals(rows[side], masks[side], columns) for side in (0, 1)]
     whitening = _whitening_filter([*residuals[0], *residuals[1]], [*masks[0], *masks[1]])
@@ -146,8 +152,8 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
 
 def _keep_settled(valid: Mask, gap_reach: int) -> Mask:
     """Valid rows that neither the ends of a part nor gaps reach."""
-    around = np.pad(~valid, gap_reach)
-    kept = np.array(np.convolve(around, np.ones(2 * gap_reach + 1), "valid") == 0)
+    invalid = np.pad(~valid, gap_reach)
+    kept = np.array(np.convolve(invalid, np.ones(2 * gap_reach + 1), "valid") == 0)
     places = np.flatnonzero(valid)
     if len(places):
         kept[: places[0] + REACH] = False
@@ -163,8 +169,9 @@ def _reach_of_gaps(valid: Sequence[Mask]) -> int:
 
 
 def _residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: FloatArray) -> list[FloatArray]:
-    whole = np.vstack([part[mask] for part, mask in zip(rows, masks, strict=True)]) / columns
-    weights = weights_of(whole.T @ whole)
+    """Per part (kept,): errors of a base fitted to the masked rows by ordinary least squares, in units of y."""
+    scaled = np.vstack([part[mask] for part, mask in zip(rows, masks, strict=True)]) / columns
+    weights = weights_of(scaled.T @ scaled)
     return [part @ (weights / columns) * columns[0] for part in rows]
 
 
@@ -176,8 +183,10 @@ def _white_error(white: FloatArray) -> float:
 
 
 def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
+    """(k,): prediction-error filter of the autoregression of these errors, by the Yule-Walker equations; (1,) where all
+    errors are zero."""
     masked = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
-    power = np.sum(
+    autocovariance = np.sum(
         [
             lagged_products(series, CONTRAST_WHITENING_ORDER)[:, 0]
             for series in masked
@@ -185,73 +194,88 @@ def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> Fl
         ],
         axis=0,
     )
-    if not np.any(power > 0):
+    if not np.any(autocovariance > 0):
         return np.array([1.0])
-    power[0] *= 1 + 1e-6
-    return np.asarray(np.concatenate([[1.0], -np.asarray(solve_toeplitz(power[:-1], power[1:]))]))
+    autocovariance[0] *= 1 + 1e-6  # a noise floor, without which errors in a narrow band make the equations singular
+    coefficients = np.asarray(solve_toeplitz(autocovariance[:-1], autocovariance[1:]))
+    return np.asarray(np.concatenate([[1.0], -coefficients]))
 
 
 def rows_with_fault_undone(
     compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant
 ) -> list[UndoneRows]:
-    """Rows with a fault of size 1 undone, one set of rows per size of the variant."""
-    found = []
-    # Undoing a fault of the predicted signal scales the errors: then the Jacobian of the undoing counts.
-    place, site = _source_of(compared.base)
-    is_predicted = fault.place == place and fault.site in (site, EVERY)
-    if is_predicted and variant.column_change is not None and isinstance(compared.base, ForceBase):
-        rate_hz = compared.base.rate_hz
-        changed = (
-            variant.column_change(rows[:, 1:], rate_hz, part) for rows, part in zip(side.rows, side.parts, strict=True)
-        )
-        return [
-            UndoneRows(tuple(np.hstack([rows[:, :1], more]) for rows, more in zip(side.rows, changed, strict=True)))
-        ]
-    for undo in variant.undo:
-        undone = tuple(undo(part) for part in side.parts)
-        still = all(a.response is b.response for a, b in zip(undone, side.parts, strict=True))
-        rows = compared.base.rows(undone, side.rows if still else None)
-        unit = variant.unit if is_predicted else 1.0
-        unit *= _unit_of_curve(compared, side, variant.curve) if is_predicted and variant.curve is not None else 1.0
-        unit /= (
-            variant.passed
-            if is_predicted and isinstance(compared.base, AutoregressiveBase) and compared.base.step == 1
-            else 1.0
-        )
-        known = all(a.known is b.known for a, b in zip(undone, side.parts, strict=True))
-        lost = None if known else _lost_rows(compared, side, undone)
-        unit *= _spread_ratio(side, rows) if is_predicted and fault.place == "actuator" else 1.0
-        found.append(UndoneRows(rows if unit == 1.0 else tuple(unit * part for part in rows), lost))
-    return found
+    """Rows of a set with a fault of size 1 undone, for each size of the variant."""
+    base = compared.base
+    is_predicted = _is_predicted(base, fault)
+    if is_predicted and variant.column_change is not None and isinstance(base, ForceBase):
+        return [_fault_in_prediction(base, side, variant.column_change)]
+    undone = [_undo_in_recordings(compared, side, undo) for undo in variant.undo]
+    if not is_predicted:
+        return undone
+    corrections = [_jacobian_correction(compared, side, fault, variant, each) for each in undone]
+    return [
+        each if factor == 1.0 else replace(each, rows=tuple(factor * part for part in each.rows))
+        for each, factor in zip(undone, corrections, strict=True)
+    ]
+
+
+def _is_predicted(base: Base, fault: Fault) -> bool:
+    """Whether the fault lies in the component that makes the signal which the base predicts."""
+    place, site = ("actuator", base.axis) if isinstance(base, ForceBase) else ("sensor", base.channel)
+    return fault.place == place and fault.site in (site, EVERY)
+
+
+def _fault_in_prediction(base: ForceBase, side: RecordingSet, change: ColumnChange) -> UndoneRows:
+    """The rows with the fault added to the predictors, not taken out of the command: the predicted signal stays as
+    recorded, so that no Jacobian is needed."""
+    changed = (change(rows[:, 1:], base.rate_hz, part) for rows, part in zip(side.rows, side.parts, strict=True))
+    return UndoneRows(tuple(np.hstack([rows[:, :1], x]) for rows, x in zip(side.rows, changed, strict=True)))
+
+
+def _undo_in_recordings(compared: ComparedBase, side: RecordingSet, undo: Undo) -> UndoneRows:
+    """The rows of a set's parts after undoing a fault in them."""
+    undone = tuple(undo(part) for part in side.parts)
+    same_motion = all(after.response is before.response for after, before in zip(undone, side.parts, strict=True))
+    rows = compared.base.rows(undone, side.rows if same_motion else None)
+    same_known = all(after.known is before.known for after, before in zip(undone, side.parts, strict=True))
+    return UndoneRows(rows, None if same_known else _lost_rows(compared, side, undone))
 
 
 def _lost_rows(compared: ComparedBase, side: RecordingSet, undone: Sequence[Part]) -> tuple[Mask, ...]:
-    """Rows that were known, and that what is unknown now reaches."""
+    """Per part: rows that were known, and that depend on samples which are unknown after undoing."""
     valid = compared.base.valid_samples(undone)
     return tuple(mask & ~_keep_settled(now, compared.gap_reach) for mask, now in zip(side.masks, valid, strict=True))
 
 
-def _unit_of_curve(compared: ComparedBase, side: RecordingSet, curve: Curve) -> float:
-    """The factor that corrects for the slope of a curve, which scales errors and is no gain: by the geometric mean of
-    the slope for errors of constant size, or by its effect on the errors of the side's own base, if that is larger.
+def _jacobian_correction(
+    compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant, undone: UndoneRows
+) -> float:
+    """Factor 1 / |g'| on the errors where undoing the fault maps the predicted signal y to g(y); see the theory above.
+    Interpolation alone lowers the errors of an autoregression by `variant.passed`, which is taken back."""
+    factor = variant.unit
+    if variant.curve is not None:
+        factor *= _slope_correction(compared, side, variant.curve)
+    if isinstance(compared.base, AutoregressiveBase) and compared.base.step == 1:
+        factor /= variant.passed
+    return factor * _spread_ratio(side, undone.rows) if fault.place == "actuator" else factor
+
+
+def _slope_correction(compared: ComparedBase, side: RecordingSet, curve: Curve) -> float:
+    """The factor for a curve g, whose slope scales errors and is no gain: 1 over the geometric mean of |g'|, which is
+    the Jacobian's, or 1 over the factor by which g scales the errors of the side's own base, if that is larger.
     Otherwise a curve would win that is flat where errors are large, or steep where the sets differ least."""
     weights = weights_of(side.white.T @ side.white) * compared.columns[0] / compared.columns
     rows = np.concatenate([part[mask] for part, mask in zip(side.rows, side.masks, strict=True)])
     errors = rows @ weights
     predicted = (compared.base.values(rows) if isinstance(compared.base, AutoregressiveBase) else rows[:, 0]) - errors
-    size = max(float(np.sqrt(np.mean(errors**2))), 1e-300)
-    slope = np.maximum(np.abs(curve(predicted + size) - curve(predicted - size)) / (2 * size), 1e-6)
-    bent = max(float(np.mean((curve(predicted + errors) - curve(predicted)) ** 2)), 1e-300)
-    return max(float(np.exp(-np.mean(np.log(slope)))), size / float(np.sqrt(bent)))
-
-
-def _source_of(base: Base) -> tuple[str, int]:
-    """Place and channel of the component that makes the signal that a base predicts."""
-    return ("actuator", base.axis) if isinstance(base, ForceBase) else ("sensor", base.channel)
+    rms = max(float(np.sqrt(np.mean(errors**2))), 1e-300)
+    slope = np.maximum(np.abs(curve(predicted + rms) - curve(predicted - rms)) / (2 * rms), 1e-6)
+    scaled = max(float(np.mean((curve(predicted + errors) - curve(predicted)) ** 2)), 1e-300)
+    return max(float(np.exp(-np.mean(np.log(slope)))), rms / float(np.sqrt(scaled)))
 
 
 def _spread_ratio(side: RecordingSet, rows: Sequence[FloatArray]) -> float:
-    """Ratio of the standard deviations of the predicted signal before and after: a weaker actuator must not reduce all
-    errors."""
+    """Standard deviation of the predicted signal before undoing over that after it: a weaker actuator must not reduce
+    all errors."""
     before, after = (float(np.std(np.concatenate([part[:, 0] for part in each]))) for each in (side.rows, rows))
     return before / after if after > 0 else 1.0

@@ -1,7 +1,8 @@
 """Finds periodic segments in a recording that declares none: parts whose command repeats exactly.
 
-A period is accepted only where the command itself, sample by sample, repeats throughout the part; commands that were
-measured with noise, or repeat approximately, are not used. Without such a part, no segments are declared.
+A candidate period is the first high peak of the command's autocorrelation. It is accepted only where the command
+itself, sample by sample, repeats with it throughout the part; commands that were measured with noise, or repeat
+approximately, are not used. Without such a part, no segments are declared.
 """
 
 from collections.abc import Sequence
@@ -17,18 +18,22 @@ from equalizer.signals.signal import FloatArray, Signal
 
 SHORTEST = 16
 """Shortest period that is searched for, in samples."""
-LEAST_WHOLE = 3
+FEWEST_PERIODS = 3
 """Least number of periods of a part: the first contains the transient, and noise needs two more."""
-LEAST_BY_ITSELF = 256
+SHORTEST_DECLARED = 256
 """Least period in samples for a diagnosis: of a shorter one an odd multiple is declared, so that odd lines stay odd."""
 ALIKE, DIPPED = 0.98, 0.7
 """Least correlation of a command with itself one period later, and level below which it must fall in between."""
+SINE_SHARE = 0.98
+"""Share of the power on a single line above which a periodic command is a sine."""
 EXACT = 1e-6
 """Largest difference of a command between periods, relative to its peak: rounding of numbers stored with six digits."""
 ROUNDED = 1e-3
 """Largest rms difference between periods due to rounding, relative to the command's rms."""
 MOST_SAMPLES = 2**19
 """Samples in which a period is looked for: limits the time of the correlation."""
+LARGEST = 1e100
+"""Largest sample whose squares can be summed without overflow; a damaged file may hold larger ones."""
 
 
 def find_segments(recording: Recording) -> tuple[Recording, str]:
@@ -37,12 +42,12 @@ def find_segments(recording: Recording) -> tuple[Recording, str]:
     if recording.segments:
         return recording, ""
     parts = parts_of(recording)
-    decided = designed_command(recording).samples
-    periods = [exact_period(decided[start:stop]) for start, stop in parts]
+    designed = designed_command(recording).samples
+    periods = [exact_period(designed[start:stop]) for start, stop in parts]
     if not any(periods):
         return recording, ""
     segments = tuple(
-        Segment(start, stop, _segment_kind(decided[start:stop], period), _peak(recording.command, start, stop), period)
+        Segment(start, stop, _segment_kind(designed[start:stop], period), _peak(recording.command, start, stop), period)
         for (start, stop), period in zip(parts, periods, strict=True)
     )
     return replace(recording, segments=segments), _segments_sentence(segments)
@@ -57,44 +62,40 @@ def designed_command(recording: Recording) -> Signal:
     return excitation if len(known) and np.ptp(known, axis=0).max() > 0 else recording.command
 
 
-HUGE = 1e100
-"""Values that no signal has, but a damaged file may."""
-
-
 def exact_period(command: FloatArray) -> int:
     """Period in samples after which the command (n, m) repeats exactly; 0 where it does not, or not often enough. An
     odd multiple of the shortest period where that is too short to be of use."""
     period = find_period(command)
-    if not period or len(command) // period < LEAST_WHOLE or not _is_same(command[period:], command[:-period]):
+    if not period or len(command) // period < FEWEST_PERIODS or not _is_same(command[period:], command[:-period]):
         return 0
-    if period >= LEAST_BY_ITSELF:
+    if period >= SHORTEST_DECLARED:
         return period
-    # While enough periods are left for the noise estimate; any multiple of a period is a period.
+    # The largest odd multiple of which `MOST_PERIODS` and the transient's fit in; a multiple of a period is a period.
     times = len(command) // period // (MOST_PERIODS + 1)
     multiple = period * max(1, times - 1 + times % 2)
-    return multiple if multiple >= LEAST_BY_ITSELF else 0
+    return multiple if multiple >= SHORTEST_DECLARED else 0
 
 
 def find_period(command: FloatArray) -> int:
     """The shortest period in samples after which the command (n, m) nearly repeats, by autocorrelation; 0 = none."""
     used = command[:MOST_SAMPLES]
-    most = float(np.abs(used).max(initial=0.0))
-    if HUGE < most < np.inf:
-        used = used / most  # whose squares would overflow
-    sizes = np.std(used, axis=0) if used.size else np.zeros(command.shape[1])
-    if not np.isfinite(used).all() or not (sizes > 0).any() or len(used) < 2 * SHORTEST:
+    largest = float(np.abs(used).max(initial=0.0))
+    if LARGEST < largest < np.inf:
+        used = used / largest
+    spread = np.std(used, axis=0) if used.size else np.zeros(command.shape[1])
+    if not np.isfinite(used).all() or not (spread > 0).any() or len(used) < 2 * SHORTEST:
         return 0
-    scaled = (used[:, sizes > 0] - used[:, sizes > 0].mean(axis=0)) / sizes[sizes > 0]
+    scaled = (used[:, spread > 0] - used[:, spread > 0].mean(axis=0)) / spread[spread > 0]
     correlation = _correlation(scaled)[: len(used) // 2 + 1]
     dips = np.flatnonzero(correlation < DIPPED)
     if not len(dips):
         return 0
-    after = np.flatnonzero(correlation[dips[0] :] > ALIKE) + dips[0]
-    if not len(after) or after[0] < SHORTEST:
+    high = np.flatnonzero(correlation[dips[0] :] > ALIKE) + dips[0]
+    if not len(high) or high[0] < SHORTEST:
         return 0
-    # First local maximum that is high enough.
-    last = after[0] + int(np.argmax(np.diff(np.append(after, after[-1] + 2)) > 1))
-    return int(after[0] + np.argmax(correlation[after[0] : last + 1]))
+    # The maximum of the first run of consecutive lags that are high enough.
+    last = high[0] + int(np.argmax(np.diff(np.append(high, high[-1] + 2)) > 1))
+    return int(high[0] + np.argmax(correlation[high[0] : last + 1]))
 
 
 def _correlation(samples: FloatArray) -> FloatArray:
@@ -110,15 +111,16 @@ def _correlation(samples: FloatArray) -> FloatArray:
 
 
 def _is_same(later: FloatArray, before: FloatArray) -> bool:
-    """Whether each channel repeats, up to rounding."""
+    """Whether each channel repeats, up to rounding: to six digits, or by one step of its own resolution with an rms
+    difference of at most `ROUNDED`."""
     if not np.isfinite(later).all() or not np.isfinite(before).all():
         return False
     for column, other in zip(later.T, before.T, strict=True):
-        off = np.abs(column - other)
-        if off.max() <= EXACT * np.abs(column).max():
+        difference = np.abs(column - other)
+        if difference.max() <= EXACT * np.abs(column).max():
             continue
         step = rounding_step(column)
-        if off.max() > 1.5 * step or np.sqrt(np.mean(off**2)) > ROUNDED * np.std(column):
+        if difference.max() > 1.5 * step or np.sqrt(np.mean(difference**2)) > ROUNDED * np.std(column):
             return False
     return True
 
@@ -127,7 +129,7 @@ def _segment_kind(command: FloatArray, period: int) -> str:
     if not period:
         return "noise"
     power = np.sum(np.abs(np.fft.rfft(command[:period] - command[:period].mean(axis=0), axis=0)) ** 2, axis=1)
-    return "sine" if power.max() > ALIKE * power.sum() else "multisine"
+    return "sine" if power.max() > SINE_SHARE * power.sum() else "multisine"
 
 
 def _peak(command: Signal, start: int, stop: int) -> float:

@@ -10,7 +10,7 @@ from analysis.evaluation.reproduction.document import PlayedRow
 from equalizer.signals.excitation import log_sweep
 from equalizer.signals.multisine import lines_between, multisines
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.tracking.feedforward.quality import quality
+from equalizer.tracking.feedforward.quality import measure_quality
 
 SignalKind = Literal["sweep", "multisine"]
 
@@ -90,7 +90,7 @@ def coupling_db(response: ComplexArray) -> FloatArray:
 def played_row(played: PlayedResponse) -> PlayedRow:
     """The response's figures of merit as a row of the document. error: rms departure from the identity matrix, per
     axis."""
-    found = quality(played.response)
+    found = measure_quality(played.response)
     axes = played.response.shape[1]
     error = np.sqrt((np.abs(played.response - np.eye(axes)) ** 2).sum() / (axes * len(played.response)))
     x, y, z = (1000 * place for place in played.place_m)

@@ -17,7 +17,7 @@ from equalizer.tracking.feedforward.baselines import (
     rigid_body,
     static_gain,
 )
-from equalizer.tracking.feedforward.quality import Quality, quality
+from equalizer.tracking.feedforward.quality import Quality, measure_quality
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,5 +56,5 @@ def compare(
     for where, response in responses.items():
         for inverse in (*inverses, *(only_at or {}).get(where, ())):
             delivered = np.asarray(response @ inverse.response)
-            rows.append(ComparisonRow(inverse.name, where, quality(delivered), inverse.multiply_adds))
+            rows.append(ComparisonRow(inverse.name, where, measure_quality(delivered), inverse.multiply_adds))
     return tuple(rows)

@@ -1,4 +1,9 @@
-"""Quality of an equalized response: flatness, coupling, direction."""
+"""Quality of an equalized response: flatness, coupling, direction.
+
+T, (lines, p, p), maps wanted to delivered accelerations; ideal is the identity. A sinusoid wanted along axis i is
+delivered as the ellipse Re(T[:, i] exp(i omega t)), whose major axis is the first left singular vector of the real
+p x 2 matrix (Re T[:, i], Im T[:, i]).
+"""
 
 from dataclasses import dataclass
 
@@ -9,32 +14,30 @@ from equalizer.signals.signal import ComplexArray
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """Worst values over all lines; perfect are 0 dB, -infinity dB, 0 degrees."""
+    """Worst values over all lines; ideal are 0 dB, -infinity dB, 0 degrees."""
 
     flatness_db: float
-    """Largest deviation of the delivered level along a wanted axis, in either direction."""
+    """Largest |20 log10 |T_ii||: deviation of the delivered level along a wanted axis, in either direction."""
     coupling_db: float
-    """Largest off-axis response over the response along the wanted axis."""
+    """Largest 20 log10(|T_ji| / |T_ii|), j != i: off-axis response over that along the wanted axis."""
     axis_error_deg: float
     """Largest angle between the wanted axis and the major axis of the delivered ellipse."""
 
 
-def quality(delivered: ComplexArray) -> Quality:
-    """Flatness, coupling and direction error of an equalized response. delivered: (lines, p, p), delivered over wanted,
-    column by column the wanted axis; perfect is the identity."""
+def measure_quality(delivered: ComplexArray) -> Quality:
+    """Flatness, coupling and direction error of an equalized response. delivered: T, (lines, p, p); column i is the
+    response to axis i."""
     along = np.abs(np.einsum("lii->li", delivered))
-    off = np.abs(delivered - np.einsum("li,ij->lij", np.einsum("lii->li", delivered), np.eye(delivered.shape[1])))
+    off_axis = np.abs(delivered * (1 - np.eye(delivered.shape[1])))
     with np.errstate(divide="ignore"):
         flatness_db = float(np.abs(20 * np.log10(along)).max())
-        coupling_db = float(20 * np.log10((off.max(axis=1) / along).max()))
-    return Quality(flatness_db, coupling_db, max(_axis_error_deg(delivered[:, :, i], i) for i in range(len(along.T))))
+        coupling_db = float(20 * np.log10((off_axis.max(axis=1) / along).max()))
+    errors_deg = (_axis_error_deg(delivered[:, :, axis], axis) for axis in range(delivered.shape[1]))
+    return Quality(flatness_db, coupling_db, max(errors_deg))
 
 
-def _axis_error_deg(played: ComplexArray, axis: int) -> float:
-    """played: (lines, p): the ellipse delivered for a wanted sinusoid along `axis`."""
-    worst = 0.0
-    for phasor in played:
-        ellipse = np.column_stack([phasor.real, phasor.imag])
-        long_axis = np.linalg.svd(ellipse)[0][:, 0]
-        worst = max(worst, float(np.degrees(np.arccos(min(1.0, abs(long_axis[axis]))))))
-    return worst
+def _axis_error_deg(phasors: ComplexArray, axis: int) -> float:
+    """Largest angle between `axis` and the major axis of the ellipse. phasors: (lines, p), T[:, axis] of each line."""
+    ellipses = np.stack([phasors.real, phasors.imag], axis=-1)
+    major_axes = np.linalg.svd(ellipses)[0][:, :, 0]
+    return float(np.degrees(np.arccos(np.minimum(1.0, np.abs(major_axes[:, axis])))).max())

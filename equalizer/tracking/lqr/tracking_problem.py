@@ -4,7 +4,9 @@
 
 A device that does not answer a constant force with acceleration has zeros near z = 1: the exact inverse of its model
 drifts at low frequencies, where nothing was identified. The force weight limits that at all frequencies, the
-low-frequency weight at low ones only.
+low-frequency weight at low ones only: it penalises w of w_{k+1} = a w_k + (1 - a) u_k, a first-order low pass of each
+force, as a further output with zero reference. (Weights by augmenting the plant: Anderson and Moore, Optimal Control:
+Linear Quadratic Methods, 1990, chapter 9.)
 """
 
 from dataclasses import dataclass
@@ -32,6 +34,7 @@ class TrackingWeights:
     low_frequency_weight: float = 0.0
     """Weight of |low-passed u|². It shortens the preview that the inverse needs."""
     low_frequency_hz: float = 3.0
+    """Corner frequency of that low pass."""
 
     def __post_init__(self) -> None:
         for name in ("weight", "low_frequency_weight"):
@@ -105,11 +108,14 @@ class TrackingProblem:
         return read_only((self.Q @ np.hstack((self.C, self.D)))[: self.outputs])
 
     def state(self, x0: FloatArray | None) -> FloatArray:
-        """(n,): at rest where None. The model's own state alone, (order of the model,), is taken too: the penalties
-        then start at rest. Raises TrackingError on another length."""
+        """(n,): a given state with that of the penalties; at rest where None. Of the model's own state alone, (order of
+        the model,), the penalties start at rest. Raises TrackingError on another length, and on values that are not
+        finite."""
         if x0 is None:
             return np.zeros(self.order)
         x = np.ascontiguousarray(x0, dtype=np.float64)
+        if not np.isfinite(x).all():
+            raise TrackingError("a state holds values that are not finite numbers")
         own = self.order - (self.C.shape[0] - self.outputs)
         if x.shape == (own,) != (self.order,):
             return np.concatenate((x, np.zeros(self.order - own)))
@@ -119,7 +125,7 @@ class TrackingProblem:
 
 
 def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> TrackingProblem:
-    """Problem of a model and its weights, augmented by the low-passed forces as outputs where those are penalised.
+    """Problem of a model and its weights, augmented by the low-passed forces as outputs where these are penalised.
 
     Raises TrackingError for an output weight of another size.
     """
@@ -143,9 +149,9 @@ def require_trajectory(problem: TrackingProblem, wanted: FloatArray) -> FloatArr
     """(N, p), contiguous. Raises TrackingError on another shape and on values that are not finite."""
     r = np.ascontiguousarray(wanted, dtype=np.float64)
     if r.ndim != 2 or r.shape[1] != problem.outputs or not len(r):
-        raise TrackingError(f"what is wanted has shape {r.shape}; this problem takes (N, {problem.outputs}), N >= 1")
+        raise TrackingError(f"the trajectory has shape {r.shape}; this problem takes (N, {problem.outputs}), N >= 1")
     if not np.isfinite(r).all():
-        raise TrackingError("what is wanted holds values that are not finite numbers; fill the gaps first")
+        raise TrackingError("the trajectory holds values that are not finite numbers; fill the gaps first")
     return r
 
 

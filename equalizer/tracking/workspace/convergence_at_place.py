@@ -1,4 +1,13 @@
-"""Convergence test of iterative learning at a place, from the models' uncertainty and their differences."""
+"""Convergence test of iterative learning at a place, from the models' uncertainty and their differences.
+
+The device at the place is unknown: it may be any draw of any model's uncertainty, or, between places, any model that is
+used. Learning inverts the weighted sum of the models' inverses. With a virtual spring of force K a at an acceleration
+a, forces u that are added to the spring's give, by a = G (u + K a), the closed loop
+
+    a = (I - G K)^-1 G u,
+
+with G from total force to acceleration. `equalizer.tracking.learning.convergence` has the condition.
+"""
 
 import numpy as np
 
@@ -10,12 +19,13 @@ from equalizer.tracking.workspace.feedforward_at_place import used_models
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 LINES = 120
-"""Lines on which convergence is tested."""
+"""Number of lines, on a logarithmic scale over the band, at which convergence is tested."""
 
 
 def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta: float = 1.0) -> Convergence | None:
-    """Convergence for every draw of every model's uncertainty and, between places, for each model that is used.
-    spring: what acts on the device and is not in the models. None where nothing says what the device may be."""
+    """The worst case over all devices that the place may have. weight: R = weight I of the inverses. spring: acts on
+    the device and is not in the models. beta: gain of learning. None for a single model without uncertainty, which
+    would only be compared with itself."""
     used = [model for _, model in used_models(at)]
     band_hz = used[0].band_hz
     lines_hz = np.asarray(np.geomspace(*band_hz, LINES), dtype=np.float64)
@@ -25,13 +35,13 @@ def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta
             devices += [model_response(model.with_parameters(row), lines_hz) for row in model.samples]
     if not devices:
         return None
-    held = np.array([_close_spring_loop(device, lines_hz, spring) for device in devices])
-    model_there = np.asarray(np.linalg.inv(at.inverse(lines_hz, weight, spring)), dtype=np.complex128)
-    return convergence(model_there, held, lines_hz, band_hz, beta)
+    closed_loops = np.array([_close_spring_loop(device, lines_hz, spring) for device in devices])
+    learned_by = np.asarray(np.linalg.inv(at.inverse(lines_hz, weight, spring)), dtype=np.complex128)
+    return convergence(learned_by, closed_loops, lines_hz, band_hz, beta)
 
 
 def _close_spring_loop(device: ComplexArray, frequency_hz: FloatArray, spring: VirtualSpring) -> ComplexArray:
-    """Response to forces that are added to the spring's, instead of to the total force."""
-    share = spring.force_per_acceleration(frequency_hz)[:, None, None]
-    around = np.eye(device.shape[1]) - device * share
-    return np.asarray(np.linalg.solve(around, device), dtype=np.complex128)
+    """(lines, p, p): (I - G K)^-1 G, from forces added to the spring's to acceleration. device: G, (lines, p, p)."""
+    spring_force = spring.force_per_acceleration(frequency_hz)[:, None, None]
+    return_difference = np.eye(device.shape[1]) - device * spring_force
+    return np.asarray(np.linalg.solve(return_difference, device), dtype=np.complex128)

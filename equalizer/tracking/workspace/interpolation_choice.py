@@ -10,7 +10,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT
-from equalizer.tracking.feedforward.quality import Quality, quality
+from equalizer.tracking.feedforward.quality import Quality, measure_quality
 from equalizer.tracking.workspace.blended_inverse import blend_at
 from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation, modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
@@ -145,9 +145,11 @@ def _check_place(
 ) -> PlaceCheck:
     blended = _equalized_response(blend_at(workspace, place.place_m), place, weight)
     if modal is None:
-        return PlaceCheck(place.place_m, quality(blended), None, _rms_error(blended), None)
+        return PlaceCheck(place.place_m, measure_quality(blended), None, _rms_error(blended), None)
     moved = _equalized_response(modal.at(place.place_m), place, weight)
-    return PlaceCheck(place.place_m, quality(blended), quality(moved), _rms_error(blended), _rms_error(moved))
+    return PlaceCheck(
+        place.place_m, measure_quality(blended), measure_quality(moved), _rms_error(blended), _rms_error(moved)
+    )
 
 
 def _equalized_response(at: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:

@@ -15,12 +15,13 @@ from study.store.disk.text_file import read_text, write_text
 
 SEAL_SUFFIX = ".sha256"
 """Added to the name of the table."""
-CORRECT = "Correct it before it is sealed; from then on nothing in it may be changed."
+CORRECT_FIRST = "Correct it before it is sealed; from then on nothing in it may be changed."
 
 
 def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
-    """Write a table with every change `repeats` times and no change twice as often, in random order. seed: None
-    draws a secret one. Raises AlreadyThereError, CannotWriteError."""
+    """Write a table with every change `repeats` times, and the control (nothing is changed) twice as often, in random
+    order. Each row has a random salt, so that the seal's hash does not tell the order to anyone who tries all of them.
+    seed: None draws a secret one. Raises AlreadyThereError, CannotWriteError."""
     every = [change.name for change in CHANGES for _ in range(repeats * (2 if change.name == NOTHING else 1))]
     order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(every))
     labels = tuple(
@@ -36,7 +37,7 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     try:
         labels = rows_from_csv(read_text(path), Label)
     except CsvError as error:
-        raise UnusableFileError(path, "table of labels", error.problems, CORRECT) from error
+        raise UnusableFileError(path, "table of labels", error.problems, CORRECT_FIRST) from error
     problems = [
         f"{label.recording}: '{label.change}' is no change of the kit"
         f"{suggest_word(label.change, tuple(CHANGES_BY_NAME))}"
@@ -46,7 +47,7 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     names = [label.recording for label in labels]
     problems += [f"{name} is there twice" for name in sorted({name for name in names if names.count(name) > 1})]
     if problems or not labels:
-        raise UnusableFileError(path, "table of labels", tuple(problems) or ("it holds no recording",), CORRECT)
+        raise UnusableFileError(path, "table of labels", tuple(problems) or ("it holds no recording",), CORRECT_FIRST)
     return labels
 
 
@@ -62,7 +63,7 @@ def seal_labels(path: Path) -> str:
             "The table was sealed before, with another hash",
             f"{seal.name} says {before or 'no hash'}; {path.name} has {digest} now.",
             "Put the table back as it was sealed. If it was wrong then, draw a new one under another name, and record "
-            "again: who diagnoses has the first hash.",
+            "again: the first hash is known to those who diagnose.",
             saved="Nothing was changed.",
         )
     return digest

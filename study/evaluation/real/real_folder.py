@@ -1,4 +1,8 @@
-"""Inventory of a folder of real recordings: sub-folders of recordings with maps that say how to read them."""
+"""Inventory of a folder of real recordings: sub-folders of recordings with maps that say how to read them.
+
+A recording is diagnosed unless its map says that it only tests what another one gave; one that was made after a change
+of the device is diagnosed against that from before it.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -61,6 +65,7 @@ class RealFolder:
 
     recordings: tuple[RealRecording, ...]
     troubles: tuple[Trouble, ...]
+    """Why a sub-folder could not be used, by its name."""
 
 
 def read_real_folder(folder: Path) -> RealFolder:
@@ -91,6 +96,7 @@ def _problem_text(problem: StudyError | OSError) -> str:
 
 
 def _recordings(folder: Path, found: Sequence[FoundMap]) -> list[RealRecording]:
+    """The recordings of a sub-folder that are to be diagnosed. found: all of its recordings with their maps."""
     made = []
     for each in found:
         if each.source.map.diagnosis.tests and any(_tests(each, other) for other in found):
@@ -114,6 +120,8 @@ def _tests(test: FoundMap, base: FoundMap) -> bool:
 
 
 def _find_pair(found_map: FoundMap, found: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
+    """The recording from before the change after which this one was made, and the change in words; None and no words
+    where the map names no such pair, or that recording is missing."""
     for pair in found_map.source.map.diagnosis.pair:
         if found_map.files[0].match(pair.after):
             before = next(

@@ -7,7 +7,7 @@ from protocols.definition.apparatus import SafetySettings
 from protocols.definition.plausibility import PlausibilitySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import MultisineSegment, highest_hz
-from protocols.definition.study_contradictions import roved_up_n
+from protocols.definition.study_contradictions import highest_roved_n
 from protocols.definition.study_protocol import StudyProtocol
 
 SPRING_SLEW_N_PER_S = 100.0
@@ -48,7 +48,7 @@ def limits_of_study(protocol: StudyProtocol) -> Limits:
 
 def highest_level_n(protocol: StudyProtocol) -> float:
     """Highest level (N) of a trial: the staircase's cap, roved to its highest."""
-    return min(roved_up_n(protocol.staircase.cap_n, protocol.stimulus.rove_db), protocol.safety.stimulus_cap_n)
+    return min(highest_roved_n(protocol.staircase.cap_n, protocol.stimulus.rove_db), protocol.safety.stimulus_cap_n)
 
 
 def limits_of_recording(protocol: RecordingProtocol) -> Limits:

@@ -1,4 +1,9 @@
-"""Forces of a probe: an odd multisine on three axes at once, every line on a single axis."""
+"""Forces of probes and references: an odd multisine on three axes at once, every line on a single axis.
+
+Lines at odd multiples of 1 / period leave the even ones to distortion, and interleaved axes let one period show the
+response to each axis (Pintelon and Schoukens, System Identification, 2nd ed., 2012, chapters 2 and 4). A probe is
+played with the hand on the handle, between trials; a reference without it, longer and at two levels.
+"""
 
 import numpy as np
 
@@ -12,13 +17,13 @@ from study.session.stimulus.held_stimulus import HeldStimulus
 FADE_S = 0.25
 """Raised-cosine fade at both ends (s), so that the beginning excites few modes. By hand."""
 HELD_S = FADE_S + PERIOD_S + 0.1
-"""Duration until it fades out: the fade, one whole period, and a tenth of a second of margin for the program."""
+"""Time from the start until the program asks for the fade-out (s): fade-in, one whole period, and a margin of 0.1 s."""
 PHASES_SEED = 16
 """Seed of the phases, the same for every probe, so that probes can be compared line by line."""
 
 
 def probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
-    """(n, 3): one period whose norm peaks at 1. Axis a has each third odd line, beginning with the a-th."""
+    """(n, 3): one period whose norm peaks at 1. Axis a has every third odd line, beginning with the a-th."""
     n = round(PERIOD_S * sample_rate_hz)
     lines = lines_between(FROM_HZ, settings.to_hz, n, sample_rate_hz, odd_only=True)
     return interleaved_multisine(lines, n, 3, PHASES_SEED)
@@ -33,22 +38,23 @@ def probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: floa
 
 
 def reference_commands(settings: ProbeSettings, sample_rate_hz: float) -> tuple[Signal, tuple[Segment, ...]]:
-    """The reference as commands, and its whole periods in them: first at full level, then, to show friction, at half of
-    it. Of each part the last third is kept for the test of a model."""
+    """The reference as commands, and its whole periods as segments: first at full level, then at half of it, because
+    friction shows in the difference. The last third of each part is held out for the test of a model."""
     wave = probe_wave(settings, sample_rate_hz)
     n, fade = len(wave), round(FADE_S * sample_rate_hz)
     part = max(4, round(settings.reference_s / PERIOD_S / 2))
-    # A period between the parts, in which the amplitude falls.
-    share = np.concatenate([np.ones(fade + part * n), np.ones(n), np.full(part * n + fade, 0.5)])
-    share[fade + part * n : fade + part * n + n] = np.linspace(1.0, 0.5, n)
-    level = settings.reference_n * share
-    forces = apply_fades(level[:, None] * wave[np.arange(-fade, len(share) - fade) % n], fade, fade)
+    # Between the parts the level falls over one period.
+    level = np.concatenate([np.ones(fade + part * n), np.linspace(1.0, 0.5, n), np.full(part * n + fade, 0.5)])
+    level_n = settings.reference_n * level
+    # A segment begins at the first sample of a period, after the fade.
+    periodic = wave[np.arange(-fade, len(level) - fade) % n]
+    forces = apply_fades(level_n[:, None] * periodic, fade, fade)
     segments = []
-    for start, level_n in ((fade, settings.reference_n), (fade + (part + 1) * n, settings.reference_n / 2)):
+    for start, peak_n in ((fade, settings.reference_n), (fade + (part + 1) * n, settings.reference_n / 2)):
         middle, stop = start + (2 * part // 3) * n, start + part * n
         segments += [
-            Segment(start, middle, "multisine", level_n, n, "fit"),
-            Segment(middle, stop, "multisine", level_n, n, "test"),
+            Segment(start, middle, "multisine", peak_n, n, "fit"),
+            Segment(middle, stop, "multisine", peak_n, n, "test"),
         ]
     return _forces(forces, sample_rate_hz), tuple(segments)
 

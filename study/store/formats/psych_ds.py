@@ -1,7 +1,8 @@
 """Trials as a Psych-DS dataset: one CSV per session below `data/`, described by `dataset_description.json`.
 
-Psych-DS 1 (https://psych-ds.github.io): file names of `keyword-value` pairs that end in `_data.csv`, and schema.org
-JSON-LD that names every column. The protocol is stored in `materials/`, so that the dataset can be analysed again.
+Psych-DS, schema version 0.4.0 (https://psych-ds.github.io): file names of `keyword-value` pairs that end in
+`_data.csv`, and schema.org JSON-LD that names every column. The protocol is stored in `materials/`, so that the dataset
+can be analysed again.
 """
 
 import json
@@ -28,8 +29,8 @@ ANSWERS_NAME = "data/description-answers_data.csv"
 """Only where the protocol asks questions."""
 KIND = "Psych-DS dataset"
 """What messages call such a folder."""
-OURS = "hapteq"
-"""Key of the description with what only this program needs: protocol, seeds, devices."""
+FACTS_KEY = "hapteq"
+"""Key of the description whose value only this program reads: provenance, seeds, devices."""
 
 README = """# {name}
 
@@ -70,7 +71,7 @@ def write_psych_ds(
     written = []
     for session in dict.fromkeys(trial.session for trial in trials):
         rows = [trial for trial in trials if trial.session == session]
-        path = folder / "data" / f"subject-{_value(rows[0].subject)}_session-{_value(session)}_data.csv"
+        path = folder / "data" / f"subject-{_keyword_value(rows[0].subject)}_session-{_keyword_value(session)}_data.csv"
         write_text(path, rows_to_csv(rows, Trial), overwrite=False)
         written.append(path)
     if answers.columns:
@@ -87,7 +88,7 @@ def write_psych_ds(
             *(_variable(column, *TRIAL_COLUMNS[column]) for column in columns(Trial)),
             *(_variable(column.name, column.description, column.question.unit) for column in answers.columns),
         ],
-        OURS: dict(facts),
+        FACTS_KEY: dict(facts),
     }
     write_text(folder / DESCRIPTION_NAME, json.dumps(description, indent=2, ensure_ascii=False) + "\n", overwrite=False)
     texts = {"README.md": README.format(name=name), "CHANGES.md": "# 1.0.0\n\nAs exported by hapteq.\n"}
@@ -103,13 +104,13 @@ def read_psych_ds(folder: Path) -> ExportedTrials:
         description = load_json(read_text(path))
     except ValueError as error:
         raise UnusableFileError(path, KIND, (str(error),)) from error
-    facts = description.get(OURS) if isinstance(description, dict) else None
+    facts = description.get(FACTS_KEY) if isinstance(description, dict) else None
     files = tuple(sorted((folder / "data").glob("subject-*_data.csv")))
     if not isinstance(facts, dict) or not files:
         missing = (
             "no file below data/ is named subject-…_data.csv"
             if isinstance(facts, dict)
-            else f"the key '{OURS}' is missing"
+            else f"the key '{FACTS_KEY}' is missing"
         )
         raise UnusableFileError(path, KIND, (missing,))
     trials = tuple(trial for each in files for trial in trials_in(each, KIND))
@@ -127,11 +128,12 @@ def trials_in(path: Path, kind: str) -> tuple[Trial, ...]:
     return tuple(rows)
 
 
-def _variable(column: str, words: str, unit: str) -> dict[str, str]:
-    found = {"@type": "PropertyValue", "name": column, "description": words}
-    return {**found, "unitText": unit} if unit else found
+def _variable(column: str, description: str, unit: str) -> dict[str, str]:
+    """A column as schema.org describes it."""
+    variable = {"@type": "PropertyValue", "name": column, "description": description}
+    return {**variable, "unitText": unit} if unit else variable
 
 
-def _value(text: str) -> str:
-    """The letters and digits only, as file names require."""
+def _keyword_value(text: str) -> str:
+    """The letters and digits only, as values in file names must be."""
     return re.sub(r"[^A-Za-z0-9]", "", text)

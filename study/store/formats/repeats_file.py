@@ -1,6 +1,7 @@
 """`*.repeats.json` beside a table of forces: the format `hapteq-repeats`, version 1.
 
-How the forces were found and for what, so that a later run can continue from them.
+Record of iterative learning control on the device: the errors of each play, and for which trajectory, model and device
+the forces were found, so that a later run continues from them only for the same.
 """
 
 from dataclasses import asdict, dataclass
@@ -21,7 +22,8 @@ KIND = "document of repeats"
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
-    """Errors are root mean squares in the band, relative to the wanted signal."""
+    """Errors are root mean squares in the band, relative to the wanted signal. A play is one repetition of the whole
+    trajectory; a correction leads from one to the next."""
 
     trajectory_sha256: str
     """SHA-256 of the wanted samples and their rate."""

@@ -38,14 +38,14 @@ SHOWN = 3
 
 @dataclass(frozen=True, slots=True)
 class CalibrationPlan:
-    """Order of `calibrate_linkage`: file to write, device, and size of the grid of positions."""
+    """What `calibrate_linkage` does: file to write, device, and size of the grid of positions."""
 
     out: Path
     device: str = "simulated"
     radius_m: float = 0.05
-    """Around the axis x."""
+    """Of the grid around the axis x."""
     depth_m: float = 0.04
-    """Before and behind the centre."""
+    """Of the grid along x, before the centre and behind it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,8 @@ class WrittenCalibration:
 
 
 def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
-    """Nothing moves: a device computes all of it. `on_progress(share)`. Raises StudyError; nothing is written then."""
+    """Read, check, complete and write the calibration. Nothing moves: the device's library computes Jacobian, inertia
+    and gravity. `on_progress(share)` counts the positions. Raises StudyError; nothing is written then."""
     require_free(plan.out, title=TITLE, kind="calibrations", saved=SAVED)
     if not (STEP_M < plan.radius_m <= LARGEST_M and STEP_M < plan.depth_m <= LARGEST_M):
         raise WrongUseError(
@@ -130,7 +131,8 @@ def calibration_lines(written: WrittenCalibration) -> tuple[str, ...]:
 
 
 def _read(linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
-    """Raises CalibrationError, DeviceError."""
+    """The calibration over the whole grid. All readings are checked before it is refused, so that an error can list the
+    problems. Raises CalibrationError, DeviceError."""
     azimuths = arm_azimuths(_centre_jacobian(linkage))
     readings, unread, worst = [], [], 0.0
     problems: list[str] = []
@@ -164,7 +166,8 @@ def _read(linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable
 
 
 def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
-    """Raises CalibrationError, DeviceError."""
+    """(3, 3): the checked Jacobian at the centre, from which the azimuths of the arms follow. Raises CalibrationError,
+    DeviceError."""
     centre = linkage.at(np.zeros(3))
     if centre is None:
         raise CalibrationError(("the centre of the workspace is out of its reach",))
@@ -175,9 +178,10 @@ def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
 
 
 def _difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
-    """Zero where a neighbour is out of reach, or where there is no number to compare: that is refused by itself."""
+    """Difference between the device's Jacobian and finite differences of its own joint angles, relative to the
+    Jacobian. 0 where a neighbour is out of reach, or where a value is no number, which `reading_problems` refuses."""
     positions = beside(reading.position_m)
-    rows = [each for position in positions if (each := linkage.angles_at(position)) is not None]
+    rows = [angle for position in positions if (angle := linkage.angles_at(position)) is not None]
     angles = np.array(rows)
     if len(rows) < len(positions) or not np.isfinite(angles).all() or not np.isfinite(reading.jacobian).all():
         return 0.0
@@ -185,16 +189,9 @@ def _difference_error(linkage: "LinkageSource", reading: LinkageReading) -> floa
 
 
 def _arrays(readings: list[LinkageReading]) -> dict[str, Any]:
-    def stacked(values: list[FloatArray]) -> FloatArray:
-        return np.stack(values)
-
-    return {
-        "position_m": stacked([each.position_m for each in readings]),
-        "joint_angle_rad": stacked([each.joint_angle_rad for each in readings]),
-        "jacobian": stacked([each.jacobian for each in readings]),
-        "inertia_kg": stacked([each.inertia_kg for each in readings]),
-        "gravity_n": stacked([each.gravity_n for each in readings]),
-    }
+    """The readings' arrays, positions first, by the fields of `LinkageCalibration`."""
+    names = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n")
+    return {name: np.stack([getattr(reading, name) for reading in readings]) for name in names}
 
 
 def _refusal(name: str, problems: tuple[str, ...]) -> DeviceError:

@@ -32,8 +32,11 @@ class RecordingPlan:
 
     protocol: RecordingProtocol
     device: str
+    """Name as the command line takes it."""
     place_m: tuple[float, float, float]
+    """Where the virtual spring holds the handle."""
     seed: int
+    """Of a simulated device's noise."""
     out: Path
 
     @property
@@ -74,7 +77,8 @@ def record_on(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
-    """Record on an open device."""
+    """Record on an open device, whose settings are `recording_settings`; as `record_device`, but `out` is not checked
+    before. Complete pieces are written even where the device fails (DeviceError)."""
     done: list[PlayedPiece] = []
     try:
         if not device.info.simulated:
@@ -82,8 +86,8 @@ def record_on(
         play_pieces(plan.protocol, device, done, on_progress)
     except KeyboardInterrupt as interruption:
         _write_whole_pieces(plan, device, done)
-        if device.fault() is Fault.FORCE_LEFT:
-            raise _still_on(plan, len(done)) from interruption
+        if device.fault() is Fault.FORCE_LEFT:  # more important to say than the interruption
+            raise _force_left_error(plan, len(done)) from interruption
         raise _interrupted_error(plan, len(done)) from interruption
     except DeviceError as error:
         _write_whole_pieces(plan, device, done)
@@ -107,7 +111,7 @@ def _interrupted_error(plan: RecordingPlan, done: int) -> UserInterruptError:
     )
 
 
-def _still_on(plan: RecordingPlan, done: int) -> DeviceError:
+def _force_left_error(plan: RecordingPlan, done: int) -> DeviceError:
     return DeviceError(
         "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=_saved_words(plan, done)
     )
@@ -135,9 +139,9 @@ def recording_settings(plan: RecordingPlan) -> DeviceSettings:
 
 
 def _write(plan: RecordingPlan, device: Device, done: list[PlayedPiece], interrupted: bool) -> WrittenRecording:
-    parts = [replace(take.recording, segments=(take.piece.segment,)) for take in done]
+    parts = [replace(played.recording, segments=(played.piece.segment,)) for played in done]
     write_recording(plan.out, join(parts, _meta(plan, device, done, interrupted)))
-    return WrittenRecording(plan.out, tuple(warning for take in done for warning in warnings_of(take)))
+    return WrittenRecording(plan.out, tuple(warning for played in done for warning in warnings_of(played)))
 
 
 def _meta(plan: RecordingPlan, device: Device, done: list[PlayedPiece], interrupted: bool) -> dict[str, Any]:
@@ -150,7 +154,7 @@ def _meta(plan: RecordingPlan, device: Device, done: list[PlayedPiece], interrup
         # Nominal mounting: the actual misalignment within its tolerance is not known when it is recorded.
         "sensor": {"frame_to_device": [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]},
         "interrupted": interrupted,
-        "segments": [segment_facts(take) for take in done],
+        "segments": [segment_facts(played) for played in done],
         "provenance": gather_provenance(
             protocol_hash=protocol_hash(protocol), seeds={"device": plan.seed}, parents=()
         ).as_dict(),

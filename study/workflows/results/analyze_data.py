@@ -36,7 +36,9 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 def analyze_data(
     data: Path, out: Path, ellipsoid: Path | None = None, protocol_name: str | None = None
 ) -> WrittenAnalysis:
-    """Analyse all sessions in `data`; an earlier analysis in `out` is replaced.
+    """Analyse all sessions in `data`; an earlier analysis in `out` is replaced. data: folder of sessions, a single
+    session, or an exported dataset. ellipsoid: a recording for the report. protocol_name: whose sessions, where there
+    are several.
 
     Raises StudyError where there is nothing to analyse, where rows contradict their protocol, or on a full disk.
     """
@@ -47,17 +49,17 @@ def analyze_data(
         raise StudyError(
             "The data contradict their protocol", f"{problem}.", "Nothing was written; look at the sessions named."
         ) from problem
-    shapes = _ellipsoids(ellipsoid)
+    found_ellipsoids = _ellipsoids(ellipsoid)
     parents = [*collected.parents, *([ellipsoid] if ellipsoid else [])]
     provenance = gather_provenance(
         protocol_hash=collected.protocol_hash,
         seeds={folder.name: seed for folder, seed in zip(collected.sessions, collected.seeds, strict=True)},
         parents=parents,
     )
-    pictures = study_pictures(analysis, shapes)
+    pictures = study_pictures(analysis, found_ellipsoids)
     _make_private(out, data)
     note_written(data, out)
-    _write(out, analysis, pictures, shapes, provenance, collected)
+    _write(out, analysis, pictures, found_ellipsoids, provenance, collected)
     return WrittenAnalysis(
         thresholds=analysis.thresholds,
         table=tuple(text_table(analysis)),
@@ -78,6 +80,8 @@ def text_table(analysis: StudyAnalysis) -> list[str]:
 
 
 def _lines(table: ThresholdTable, heading: str) -> list[str]:
+    """One line per frequency: mean over participants, values that the cap cut included, their number, and the number
+    of participants."""
     lines = [f"{'frequency':>10}  {heading:>10}  {'cut by cap':>10}  participants"]
     for column, frequency_hz in enumerate(table.frequencies_hz):
         values = [value for row in table.values if (value := row[column]) is not None]
@@ -91,12 +95,12 @@ def _primary_lines(analysis: StudyAnalysis) -> list[str]:
     """Medians of the hierarchical model, beside the means."""
     if analysis.primary is None:
         return []
-    lines = [f"{'frequency':>10}  {'median':>10}  {'95 % interval, all answers in one model':>10}"]
+    lines = [f"{'frequency':>10}  {'median':>10}  95 % interval, all answers in one model"]
     for median in analysis.primary.medians:
-        size = f"{median.newton:.3f} N" if median.upper_n is not None else "above cap"
+        value = f"{median.newton:.3f} N" if median.upper_n is not None else "above cap"
         unit = " N" if median.lower_n is not None else ""
-        end = interval_words(median.lower_n, median.upper_n, 3) + unit
-        lines.append(f"{median.frequency_hz:7g} Hz  {size:>10}  {end}")
+        interval = interval_words(median.lower_n, median.upper_n, 3) + unit
+        lines.append(f"{median.frequency_hz:7g} Hz  {value:>10}  {interval}")
     return [*lines, limit_words(analysis.primary), analysis.compared]
 
 
@@ -116,7 +120,8 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
 
 
 def sensor_frame(recording: Recording) -> FloatArray | None:
-    """Rotation from the sensor's axes to the device's, as the recording states it; None if it does not."""
+    """(3, 3): rotation from the sensor's axes to the device's, as the recording states it; None if it does not. Raises
+    ValueError for another shape."""
     sensor = recording.meta.get("sensor")
     frame = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
     if frame is None:
@@ -143,7 +148,7 @@ def _write(
     out: Path,
     analysis: StudyAnalysis,
     pictures: tuple[Picture, ...],
-    shapes: tuple[EllipsoidResult, ...],
+    found_ellipsoids: tuple[EllipsoidResult, ...],
     provenance: Provenance,
     collected: CollectedTrials,
 ) -> None:
@@ -165,8 +170,8 @@ def _write(
     format_name, version = document.pop("format"), document.pop("version")
     write_json(out / "anova.json", format_name, version, document, provenance, overwrite=True)
     write_pictures(figures, pictures)
-    shown = _origin_entries(provenance, collected)
-    page = render_study_report(analysis, pictures, shown, local_now(), shapes, collected.qualities)
+    origin = _origin_entries(provenance, collected)
+    page = render_study_report(analysis, pictures, origin, local_now(), found_ellipsoids, collected.qualities)
     write_text(out / PAGE_NAME, page, overwrite=True)
 
 

@@ -1,4 +1,4 @@
-"""After a sitting, with the device closed: results of a finished session, or why there are none."""
+"""After a sitting, with the device closed: results of a finished session, or the error that says why there are none."""
 
 from dataclasses import replace
 
@@ -18,8 +18,8 @@ from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.session.resume_session import already_finished
 from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
 
-OF_THE_DEVICE = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
-"""Faults that a look at the device may explain."""
+DEVICE_FAULTS = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
+"""Faults that `hapteq doctor` may explain: all but those of the program's timing and of a person."""
 
 BUSY_ADVICE = "Close other programs, and measure with hapteq doctor whether that helps. "
 
@@ -28,7 +28,7 @@ def end_sitting(end: ConductedSitting, utc: str) -> WrittenAnalysis:
     """Write the results, or erase what a participant withdrew. Raises StudyError for an unfinished session, with how
     to continue and an exit code that says why it ended."""
     if end.withdrawn:
-        raise _erase(end, utc)
+        raise _erase_withdrawn(end, utc)
     if end.state.turned_away_for_good:
         write_tables(end.folder)
         raise does_not_take_part(end.state)
@@ -55,19 +55,21 @@ def finish_closed(folder: SessionFolder, folded: FoldedSession) -> WrittenAnalys
 
 def _not_finished(end: ConductedSitting) -> StudyError:
     kind = UserInterruptError if end.fault is Fault.NONE else DeviceError
-    look = f"Run hapteq doctor --device {end.device_name}, which says what is wrong with it, and mend that. "
-    advice = look if end.fault in OF_THE_DEVICE else ""
-    first = BUSY_ADVICE if end.left.startswith(TOO_BUSY) else advice
+    device_advice = f"Run hapteq doctor --device {end.device_name}, which says what is wrong with it, and mend that. "
+    advice = device_advice if end.fault in DEVICE_FAULTS else ""
+    if end.left.startswith(TOO_BUSY):
+        advice = BUSY_ADVICE
     option = "" if end.device_name == SIMULATED else f" --device {end.device_name}"
     return kind(
         "The session is not finished",
         f"The sitting ended: {end.left}.{f' {end.why[0].upper()}{end.why[1:]}.' if end.why else ''}",
-        f"{first}Go on with: hapteq resume {end.folder.path}{option}",
+        f"{advice}Go on with: hapteq resume {end.folder.path}{option}",
         saved=f"{answers_are(end.state.answers)} on disk.",
     )
 
 
-def _erase(end: ConductedSitting, utc: str) -> StudyError:
+def _erase_withdrawn(end: ConductedSitting, utc: str) -> StudyError:
+    """Erase everything recorded of the participant; the error to raise, with which the sitting ends, says what."""
     data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
     elsewhere = copies_elsewhere(data, plan)
     withdraw(data, plan, utc)

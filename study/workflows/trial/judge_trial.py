@@ -1,4 +1,9 @@
-"""Judge from the device's counters whether an answered trial counts."""
+"""Judge from the device's counters whether an answered trial counts.
+
+A trial is void where the participant did not feel the stimulus as planned (a fault, or ticks of the 1 kHz loop that
+were missed or late), or where a measurement that the protocol requires is missing. It then comes again; the answer is
+kept in the log, and counts for nothing.
+"""
 
 from dataclasses import dataclass
 
@@ -26,8 +31,11 @@ def judge(
     health: Health, settings: MeasurementSettings, felt_whole: bool, at_answer: Health | None = None
 ) -> Judgement:
     """Judge the trial. health: counters until the release; at_answer: those at the answer, None where both are the
-    same. felt_whole: whether the stimulus was complete until the answer; later faults are only flagged, and late ticks
-    not judged."""
+    same. felt_whole: whether the stimulus was complete until the answer; later faults are then only flagged.
+
+    Late ticks are counted until the answer, because later ones change nothing that was felt; missed ticks, which also
+    make the recorded spectrum wrong, until the release.
+    """
     if health.fault is not Fault.NONE and not felt_whole:
         return Judgement(health.fault.value, (), cause_of(health.fault))
     if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
@@ -60,7 +68,8 @@ def _too_late(health: Health, settings: MeasurementSettings) -> str:
 
 
 def _acceleration_missing(health: Health, settings: MeasurementSettings) -> str:
-    """Whether more is missing than the protocol allows; empty if not."""
+    """How much of the acceleration is missing, in words; empty where that is within the protocol's limit, or there is
+    no accelerometer."""
     if health.sensor is None or health.sensor.missing <= settings.lost_packets_limit:
         return ""
     return f"{100 * health.sensor.missing:.1f} % {ACCELERATION_MISSING}"

@@ -1,4 +1,9 @@
-"""Masking noise of a sitting: started before the first trial, silent in pauses, logged; no trial counts without it."""
+"""Masking noise of a sitting, so that the device cannot be heard.
+
+It starts before the first trial, is silent in pauses, and is logged. No trial counts without it: it is checked before
+every trial and at every answer. The noise is a loop of band-limited noise from a seed, so that a session can be
+repeated with the same sound.
+"""
 
 import contextlib
 from collections.abc import Iterator
@@ -17,19 +22,19 @@ from study.workflows.trial.sitting import Sitting, Sound, record
 SAMPLE_RATE_HZ = 44_100
 """Sample rate of the noise: one that every sound card plays."""
 LOOP_S = 60
-"""Length of the loop: longer than a person remembers noise."""
+"""Length of the loop (s): longer than a person remembers noise."""
 
 
 @contextlib.contextmanager
 def opened_sound(settings: MaskingSettings, clock: Clock, observer: str | None) -> Iterator[Sound | None]:
-    """Play the masking noise; None where the protocol wants none, or no person is there (a simulated participant,
-    virtual time). Raises `DeviceError`: before a session is begun."""
+    """The sound output with the masking noise, not yet playing; closed at the end. None where the protocol wants none,
+    or no person is there (a simulated participant, virtual time). Raises `DeviceError`, before a session is begun."""
     if not settings.play or clock.virtual or observer is not None:
         yield None
         return
     samples = masking_noise(LOOP_S, settings.low_hz, settings.high_hz, settings.seed, SAMPLE_RATE_HZ)
-    quieter = np.rint(samples * 10 ** (settings.level_db / 20)).astype(np.int16)
-    with contextlib.closing(masking_sound(quieter, SAMPLE_RATE_HZ)) as sound:
+    attenuated = np.rint(samples * 10 ** (settings.level_db / 20)).astype(np.int16)
+    with contextlib.closing(masking_sound(attenuated, SAMPLE_RATE_HZ)) as sound:
         yield sound
 
 
@@ -42,7 +47,7 @@ def start_masking(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def check_masking(state: SessionState, sitting: Sitting) -> SessionState:
-    """Before a trial. Raises `DeviceError` where the noise is not audible any more, which is logged first."""
+    """Check before a trial that the noise is playing. Raises `DeviceError` where it is not, which is logged first."""
     if sitting.sound is None:
         return state
     try:
@@ -54,8 +59,8 @@ def check_masking(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def was_masked(sitting: Sitting) -> bool:
-    """Whether the noise was still audible at the answer, where it is required. A failure is logged before the next
-    trial."""
+    """Whether the noise was still playing at the answer; True where none is required. A failure is logged before the
+    next trial (`check_masking`)."""
     if sitting.sound is None:
         return True
     try:

@@ -46,6 +46,17 @@ def test_more_friction_is_named_on_every_axis_with_its_number_and_time(session):
         assert each.rivals == ()
 
 
+@pytest.mark.parametrize("break_away_m", [1.5e-5, 3e-5])
+def test_the_level_of_friction_is_right_between_the_lengths_that_are_tried(
+    session, drifting_device, monkeypatch, break_away_m
+):
+    monkeypatch.setattr(drifting_device, "BRISTLE_M", break_away_m)
+    found = drifts(session(1, friction_n=0.2), 1000)
+    assert {(each.cause, each.axis) for each in found} == {("friction", axis) for axis in "xyz"}
+    assert np.mean([each.change for each in found]) == pytest.approx(0.08, abs=0.015)
+    assert np.mean([each.before for each in found]) == pytest.approx(0.12, abs=0.02)
+
+
 def test_a_weaker_motor_is_a_gain_or_not_told_from_a_grip_and_says_so(session):
     found = drifts(session(1, gain=0.9), 1000)
     assert [(each.cause, each.axis) for each in found] == [("gain", axis) for axis in "xyz"]

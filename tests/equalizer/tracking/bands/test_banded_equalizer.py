@@ -11,7 +11,7 @@ from equalizer.tracking.bands.high_band import ModelledResponse
 from equalizer.tracking.bands.rigid_model import fit_rigid_model
 from equalizer.tracking.bands.stylus import StylusActuator
 from equalizer.tracking.feedforward.band_split import BandEdges, CausalSplit, LinearPhaseSplit
-from equalizer.tracking.feedforward.quality import quality
+from equalizer.tracking.feedforward.quality import measure_quality
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.lqr.limits import ForceLimitError
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights
@@ -119,7 +119,7 @@ def test_the_split_leaves_the_middle_band_flat_and_without_coupling(device, band
         found = equalizer.play(wanted)
         middle = device.play(found.entering)[found.rows_of_wanted(len(wanted))][period : 2 * period]
         delivered[:, :, axis] = np.fft.rfft(middle, axis=0)[lines] / spectrum[lines, None]
-    found = quality(delivered)
+    found = measure_quality(delivered)
     assert found.flatness_db <= 0.1
     assert found.coupling_db <= -40
 

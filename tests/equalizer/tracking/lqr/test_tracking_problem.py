@@ -40,6 +40,12 @@ def test_the_model_s_own_state_is_filled_up_with_penalties_at_rest(problem_of):
         problem.state(np.ones(5))
 
 
+def test_a_state_that_is_no_number_is_refused(problem_of):
+    problem = problem_of(4, 1)
+    with pytest.raises(TrackingError, match="a state holds values that are not finite"):
+        track(stored_gains(problem, 5), np.zeros((5, 3)), x0=np.array([0.0, np.nan, 0.0, 0.0]))
+
+
 def test_the_matrices_cannot_be_written(problem_of):
     with pytest.raises(ValueError, match="read-only"):
         problem_of(4, 1).stage_cost[0, 0] = 1.0

@@ -12,7 +12,7 @@ import pytest
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.tracking.feedforward.quality import Quality, quality
+from equalizer.tracking.feedforward.quality import Quality, measure_quality
 from equalizer.tracking.workspace.workspace_models import WorkspaceModels
 
 LENGTH_M = 0.06
@@ -49,7 +49,8 @@ class Workspaces:
     def worst(self, at, bend=0.0) -> Quality:
         """at: from a place to ModelsAtPlace. Over all lines and 21 places."""
         found = [
-            quality(self.plant(x, bend).response(LINES_HZ) @ at(self.place_m(x)).inverse(LINES_HZ)) for x in OFF_GRID
+            measure_quality(self.plant(x, bend).response(LINES_HZ) @ at(self.place_m(x)).inverse(LINES_HZ))
+            for x in OFF_GRID
         ]
         return Quality(
             max(each.flatness_db for each in found),

@@ -9,7 +9,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.tracking.feedforward.baselines import identified_inverse, raw_estimate, rigid_body
 from equalizer.tracking.feedforward.comparison import baseline_inverses, compare
-from equalizer.tracking.feedforward.quality import quality
+from equalizer.tracking.feedforward.quality import measure_quality
 
 LINES = np.arange(5.0, 35.001, 0.1)
 NAMES = [
@@ -108,6 +108,6 @@ def test_centre_and_hand_over_five_seeds(workspaces, plants):
         found = []
         for seed in range(1, 6):
             model = workspaces.identified(plant, 10 * seed + hand, order=26)
-            reached = quality(truth @ identified_inverse(model, LINES).response)
+            reached = measure_quality(truth @ identified_inverse(model, LINES).response)
             found.append((reached.flatness_db, reached.coupling_db, reached.axis_error_deg))
         assert (np.max(found, axis=0) <= limits).all(), (name, found)
