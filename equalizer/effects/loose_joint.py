@@ -1,4 +1,8 @@
-"""Loose joint: dry friction alone within a gap, a spring beyond it."""
+"""Loose joint: dry friction alone within a gap, a spring beyond it.
+
+The force acts along the joint's travel r, and adds to what the model has there: between the driven axis and the
+heaviest body attached to it or, where there is none, between the axis and the ground (`joint_direction`).
+"""
 
 from itertools import product
 
@@ -21,11 +25,12 @@ STEPS = 8
 """Integration steps per sample."""
 GAPS, STIFFNESSES, SLIPS = (0.2, 0.5, 1.2, 3.0, 8.0), (0.05, 0.2, 0.6), (0.01, 0.1, 0.4)
 """Starting values that are tried: gaps relative to the joint's rms travel in the model; stiffnesses relative to the
-model's; slip forces relative to the product of both."""
+model's at the joint; slip forces relative to that stiffness times that travel."""
 TRIED_S, SETTLING, FINER = 2.0, 4, 4
-"""Seconds of the recording that are simulated; divisor of the share left out at the beginning because it is not at
-rest; number of the best pairs of gap and stiffness that are tried with every slip force."""
-_FAST: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
+"""Seconds of the recording that are simulated; a quarter of them, at the beginning, is not compared, because the
+simulation starts from rest; number of the best pairs of gap and stiffness that are tried with every slip force."""
+_ABSENT: Values = {"gap": 0.0, "stiffness": 0.0, "slip": 0.0}
+"""Values with which the joint has no force of its own."""
 
 
 @compile_law
@@ -83,7 +88,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """The best of a coarse grid, by the residual on an excerpt of the record: first gaps and stiffnesses, then
     slips."""
     part, joint = _strongest_part(evidence, axis), joint_direction(evidence.model, axis)
-    travel = float(np.std(_simulate_part(evidence, axis, _FAST, part)[1]))
+    travel = float(np.std(_simulate_part(evidence, axis, _ABSENT, part)[1]))
     held = max(abs(value_along(evidence.model.stiffness, joint)) / float(joint @ joint) ** 2, 1e-6)
     measured = evidence.response[part]
 

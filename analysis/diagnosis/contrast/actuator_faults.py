@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.contrast.fault import (
     ColumnChange,
     Fault,
-    Numbers,
+    ParametersOf,
     Rows,
     Undo,
     Variant,
@@ -98,7 +98,7 @@ def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
     yield replace(axis.fault("force_gain_drift", drifts), varies=True, simpler=("force_gain",))
 
 
-def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
+def _gain_drift(axis: _Axis, begun: float, parameters_of: ParametersOf) -> Variant:
     def ramp(part: Part, count: int) -> FloatArray:
         passed = 1 + drift_shape(part, begun)
         return np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(passed)), passed)[:, None]
@@ -108,7 +108,7 @@ def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
         command[:, [axis.number]] *= ramp(part, len(command))
         return replace(part, command=command)
 
-    return Variant((undo,), numbers, -0.9, 20.0, column_change=lambda x, rate, part: x * ramp(part, len(x)))
+    return Variant((undo,), parameters_of, -0.9, 20.0, column_change=lambda x, rate, part: x * ramp(part, len(x)))
 
 
 def drift_shape(part: Part, begun: float) -> FloatArray:

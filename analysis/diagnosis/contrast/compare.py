@@ -161,10 +161,10 @@ def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
 
 def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, plain: Fit, samples: int) -> JudgedFault:
     fit, fault, variant, pairs = found
-    values = variant.values(fit.sizes)
+    values = variant.parameters_of(fit.sizes)
     apart = _leave_out_blocks(pairs)
     fits = [fit_sizes(kept, variant) for kept in apart]
-    sides = [[variant.values(fit.sizes) for fit in fits], _values_without_clean_blocks(pairs, variant)]
+    sides = [[variant.parameters_of(fit.sizes) for fit in fits], _values_without_clean_blocks(pairs, variant)]
     held = sum(held_out_error(kept, each.sizes, out) for out, kept, each in zip(SIXTHS, apart, fits, strict=True))
     spread = {
         name: float(
@@ -195,7 +195,7 @@ def _values_without_clean_blocks(pairs: Sequence[Pair], variant: Variant) -> lis
         [replace(pair, without=(*pair.without[: out[0]], *pair.without[out[-1] + 1 :])) for pair in pairs]
         for out in SIXTHS
     ]
-    return [variant.values(fit_sizes(each, variant).sizes) for each in kept]
+    return [variant.parameters_of(fit_sizes(each, variant).sizes) for each in kept]
 
 
 def _jackknife_variance(values: Sequence[float]) -> float:

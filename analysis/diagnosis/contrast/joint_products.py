@@ -97,7 +97,7 @@ class Fit:
 
     sizes: FloatArray
     errors: FloatArray
-    """(blocks with, then without): white sums of squares, over all compared_bases."""
+    """(blocks with, then without): whitened sums of squares, over all bases."""
 
     @property
     def error(self) -> float:
@@ -106,9 +106,10 @@ class Fit:
 
 def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
     """The sizes with the least error, every base fitted to both sides. variant: None = no fault."""
-    sizes = np.zeros(0) if variant is None else _starting_sizes(variant)
-    for _ in range(0 if variant is None else ROUNDS):
-        assert variant is not None
+    if variant is None:
+        return _fit_at(pairs, np.zeros(0))
+    sizes = _starting_sizes(variant)
+    for _ in range(ROUNDS):
         gradients, grams = np.zeros(len(sizes)), np.zeros((len(sizes), len(sizes)))
         for pair in pairs:
             gradient, gram = _newton_terms(pair, sizes)
@@ -120,6 +121,10 @@ def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
             sizes = moved
             break
         sizes = moved
+    return _fit_at(pairs, sizes)
+
+
+def _fit_at(pairs: Sequence[Pair], sizes: FloatArray) -> Fit:
     return Fit(sizes, sum((_errors(pair, sizes) for pair in pairs), np.zeros(1)))
 
 

@@ -3,18 +3,14 @@
 import errno
 from pathlib import Path
 
-import numpy as np
-
 from analysis.figures.picture import Picture
 from analysis.figures.study_pictures import study_pictures
-from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
+from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids, sensor_frame
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.declared_section import declared_words
 from analysis.reports.primary_tables import interval_words, limit_words
 from analysis.reports.study_report import render_study_report
-from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
 from study.errors import StudyError
 from study.local_clock import local_now
 from study.store.disk.file_errors import CannotWriteError
@@ -113,18 +109,6 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
             "Give a recording made with: hapteq record ellipsoid",
             saved="Nothing was written.",
         ) from problem
-
-
-def sensor_frame(recording: Recording) -> FloatArray | None:
-    """Rotation from the sensor's axes to the device's, as the recording states it; None if it does not."""
-    sensor = recording.meta.get("sensor")
-    frame = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
-    if frame is None:
-        return None
-    rotation = np.asarray(frame, dtype=np.float64)
-    if rotation.shape != (3, 3):
-        raise ValueError(f"the sensor's frame has the shape {rotation.shape}; it must be (3, 3)")
-    return rotation
 
 
 def _make_private(out: Path, data: Path) -> None:
