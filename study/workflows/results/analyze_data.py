@@ -30,12 +30,13 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 
 
 def analyze_data(
-    data: Path, out: Path, ellipsoid: Path | None = None, protocol_name: str | None = None
+    data: Path | str, out: Path | str, ellipsoid: Path | str | None = None, protocol_name: str | None = None
 ) -> WrittenAnalysis:
     """Analyse all sessions in `data`; an earlier analysis in `out` is replaced.
 
     Raises StudyError where there is nothing to analyse, where rows contradict their protocol, or on a full disk.
     """
+    data, out, ellipsoid = Path(data), Path(out), None if ellipsoid is None else Path(ellipsoid)
     collected = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
         analysis = analyse_study(collected.trials, collected.protocol, collected.left_out)
