@@ -193,9 +193,12 @@ def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> Fl
 def rows_with_fault_undone(
     compared: ComparedBase, side: RecordingSet, fault: Fault, variant: Variant
 ) -> list[UndoneRows]:
-    """Rows with a fault of size 1 undone, one set of rows per size of the variant."""
+    """Rows with a fault of size 1 undone, one set of rows per size of the variant.
+
+    Undoing a fault of the signal that the base predicts also scales the errors of the base. The rows are scaled back,
+    as a Jacobian does in a likelihood: otherwise a fault would win that only makes all errors smaller.
+    """
     found = []
-    # Undoing a fault of the predicted signal scales the errors: then the Jacobian of the undoing counts.
     place, site = _source_of(compared.base)
     is_predicted = fault.place == place and fault.site in (site, EVERY)
     if is_predicted and variant.column_change is not None and isinstance(compared.base, ForceBase):
@@ -210,18 +213,25 @@ def rows_with_fault_undone(
         undone = tuple(undo(part) for part in side.parts)
         still = all(a.response is b.response for a, b in zip(undone, side.parts, strict=True))
         rows = compared.base.rows(undone, side.rows if still else None)
-        unit = variant.unit if is_predicted else 1.0
-        unit *= _unit_of_curve(compared, side, variant.curve) if is_predicted and variant.curve is not None else 1.0
-        unit /= (
-            variant.passed
-            if is_predicted and isinstance(compared.base, AutoregressiveBase) and compared.base.step == 1
-            else 1.0
-        )
+        unit = _unit_of_errors(compared, side, (fault, variant), rows) if is_predicted else 1.0
         known = all(a.known is b.known for a, b in zip(undone, side.parts, strict=True))
         lost = None if known else _lost_rows(compared, side, undone)
-        unit *= _spread_ratio(side, rows) if is_predicted and fault.place == "actuator" else 1.0
         found.append(UndoneRows(rows if unit == 1.0 else tuple(unit * part for part in rows), lost))
     return found
+
+
+def _unit_of_errors(
+    compared: ComparedBase, side: RecordingSet, tried: tuple[Fault, Variant], rows: Sequence[FloatArray]
+) -> float:
+    """Factor on the rows that takes out what undoing a fault of the predicted signal does to errors that the fault did
+    not cause: a smaller gain, a flat curve, interpolation between samples, a weaker actuator."""
+    fault, variant = tried
+    unit = variant.unit
+    if variant.curve is not None:
+        unit *= _unit_of_curve(compared, side, variant.curve)
+    if isinstance(compared.base, AutoregressiveBase) and compared.base.step == 1:
+        unit /= variant.passed
+    return unit * _spread_ratio(side, rows) if fault.place == "actuator" else unit
 
 
 def _lost_rows(compared: ComparedBase, side: RecordingSet, undone: Sequence[Part]) -> tuple[Mask, ...]:
