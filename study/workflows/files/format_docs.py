@@ -258,7 +258,9 @@ _TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
         Trial,
         "One row per presentation. Further columns may follow. `felt` is false where a person answered while no device "
         "moved, and empty for simulated participants. In rows of the phase `catch` the level is the cap, and the "
-        "staircase does not move; in rows of the phase `detection`, `direction_shown` and `answer` are intervals.",
+        "staircase does not move; in rows of the phase `detection`, `direction_shown` and `answer` are intervals. "
+        "Else they are numbers on the screen: where a protocol exchanges these for half of the people, `angle_deg` "
+        "tells the direction.",
     ),
     (
         "thresholds.csv",
