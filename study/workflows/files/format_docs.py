@@ -256,11 +256,9 @@ _TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
     (
         "trials.csv",
         Trial,
-        "One row per presentation. Further columns may follow. `felt` is false where a person answered while no device "
-        "moved, and empty for simulated participants. In rows of the phase `catch` the level is the cap, and the "
-        "staircase does not move; in rows of the phase `detection`, `direction_shown` and `answer` are intervals. "
-        "Else they are numbers on the screen: where a protocol exchanges these for half of the people, `angle_deg` "
-        "tells the direction.",
+        "One row per presentation; more columns may follow. `felt` is false where a person answered while no device "
+        "moved, empty for simulated people. `direction_shown` and `answer` are numbers on the screen (`angle_deg` tells "
+        "the direction), in the phase `detection` intervals. In `catch` the level is the cap, and no staircase moves.",
     ),
     (
         "thresholds.csv",
