@@ -257,8 +257,8 @@ _TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
         "trials.csv",
         Trial,
         "One row per presentation; more columns may follow. `felt` is false where a person answered while no device "
-        "moved, empty for simulated people. `direction_shown` and `answer` are numbers on the screen (`angle_deg` tells "
-        "the direction), in the phase `detection` intervals. In `catch` the level is the cap, and no staircase moves.",
+        "moved, empty for simulated ones. `direction_shown` and `answer` are numbers on the screen (`angle_deg` tells "
+        "the direction), in the phase `detection` intervals. In `catch` the level is the cap; no staircase moves.",
     ),
     (
         "thresholds.csv",
