@@ -1,12 +1,12 @@
 """Sessions, devices, files, people, screens: the only package with side effects.
 
-Layers, each importing only those after it: `cli`, `tui`, `workflows`, `devices`, then `store` and `participants`
-beside each other, then `session`, which is pure, then `regular_file` and `errors`.
+Layers, each importing only those after it: `cli`, `tui`, `evaluation`, `workflows`, `importing`, `devices`, then
+`store` and `participants` beside each other, then `local_clock`, `session`, which is pure, `regular_file` and `errors`.
 
-Read in this order: `session.facts.events` (the facts), `session.state.fold` (the state that follows
-from them), `session.state.machine` (the next action), `workflows.session.run_session` and
-`workflows.trial.present_trial` (its execution), `devices.device` (the port), `devices.governor.govern` (force limits)
-and `store.sessions.event_log` (facts are on disk before the program acts on them).
+Read in this order: `session.facts.events` (the facts), `session.state.fold` (the state that follows from them),
+`session.state.machine` (the next action), `workflows.session.run_session` and `workflows.trial.present_trial` (its
+execution), `devices.device` (the port), `devices.governor.govern` (force limits) and `store.sessions.event_log` (facts
+are on disk before the program acts on them).
 
 Decisions:
 

@@ -11,9 +11,13 @@ class ExitCode(IntEnum):
 
     DONE = 0
     ERROR = 1
+    """A `StudyError` of any other kind."""
     WRONG_USE = 2
+    """A command line, a file or a setting that cannot be meant."""
     DEVICE = 3
+    """The device: missing, failed, lost during a session, or found not in order by `hapteq doctor`."""
     INTERRUPTED = 130
+    """Ctrl-C, or a terminal that was closed."""
 
 
 class StudyError(Exception):

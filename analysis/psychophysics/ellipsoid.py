@@ -24,6 +24,8 @@ from equalizer.signals.signal import FloatArray
 
 HARMONICS = 5
 """Harmonics looked at, the fundamental included, as far as they lie below half the sample rate."""
+ORTHONORMAL = 1e-3
+"""Largest error of the products of a rotation's rows: of angles written with three digits. By hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +105,26 @@ def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None)
             "record sinusoids along several directions"
         )
     return tuple(results)
+
+
+def sensor_frame(recording: Recording) -> FloatArray | None:
+    """(3, 3): rotation from the sensor's axes to the device's, as the recording states it; None where it states none.
+
+    Raises ValueError where what it states is no rotation: another matrix would stretch every ellipse.
+    """
+    sensor = recording.meta.get("sensor")
+    stated = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
+    if stated is None:
+        return None
+    try:
+        rotation = np.asarray(stated, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError("the sensor's frame is no matrix of numbers") from error
+    if rotation.shape != (3, 3):
+        raise ValueError(f"the sensor's frame has the shape {rotation.shape}; it must be (3, 3)")
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=ORTHONORMAL):
+        raise ValueError("the sensor's frame is no rotation: its rows must be perpendicular and of length 1")
+    return rotation
 
 
 def direction_frame(unit_vector: FloatArray) -> FloatArray:

@@ -1,4 +1,8 @@
-"""Delivered over wanted accelerations in a study whose stimuli are equalized."""
+"""Delivered over wanted accelerations in a study whose stimuli are equalized.
+
+By direction of the device, not by its number on the screen: numbers may be exchanged between people, and a device that
+delivers too much along one direction and too little along the other would then seem right on average.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +23,7 @@ class Delivery:
     frequency_hz: float
     trials: int
     along: tuple[float | None, float | None]
-    """Delivered over wanted, direction 1 and 2; None without a trial of it."""
+    """Delivered over wanted, along the protocol's direction 1 and 2; None without a trial of it."""
     off_axis: float
     """Off the direction over what was delivered along it."""
 
@@ -32,9 +36,10 @@ class Delivery:
 def deliveries(trials: Sequence[Trial]) -> tuple[Delivery, ...]:
     """Deliveries by rising frequency; empty where levels are commanded forces."""
     measured = [trial for trial in trials if trial.counts and trial.wanted_mps2 and trial.delivered_mps2]
-    ordered = sorted(measured, key=lambda trial: trial.frequency_hz)
+    ordered, first_deg = sorted(measured, key=lambda trial: trial.frequency_hz), _larger_angle_deg(measured)
     return tuple(
-        _summarise_delivery(hz, list(group)) for hz, group in groupby(ordered, key=lambda trial: trial.frequency_hz)
+        _summarise_delivery(hz, list(group), first_deg)
+        for hz, group in groupby(ordered, key=lambda trial: trial.frequency_hz)
     )
 
 
@@ -55,10 +60,11 @@ def delivery_warning(found: Sequence[Delivery]) -> str:
     )
 
 
-def _summarise_delivery(frequency_hz: float, trials: list[Trial]) -> Delivery:
+def _summarise_delivery(frequency_hz: float, trials: list[Trial], first_deg: float | None) -> Delivery:
+    """first_deg: angle of direction 1, where it is known."""
     sides: list[float | None] = []
     for number in (1, 2):
-        ratios = [_delivery_ratio(trial) for trial in trials if trial.direction_shown == number]
+        ratios = [_delivery_ratio(trial) for trial in trials if _played_direction(trial, first_deg) == number]
         sides.append(median(ratios) if ratios else None)
     return Delivery(
         frequency_hz,
@@ -66,6 +72,19 @@ def _summarise_delivery(frequency_hz: float, trials: list[Trial]) -> Delivery:
         (sides[0], sides[1]),
         median((trial.off_axis_mps2 or 0.0) / (trial.delivered_mps2 or 1.0) for trial in trials),
     )
+
+
+def _larger_angle_deg(trials: Sequence[Trial]) -> float | None:
+    """Angle of the protocol's direction 1, the larger of the two; None where not both are known."""
+    angles = {trial.angle_deg for trial in trials}
+    return max((angle for angle in angles if angle is not None), default=None) if len(angles - {None}) == 2 else None
+
+
+def _played_direction(trial: Trial, first_deg: float | None) -> int:
+    """The protocol's direction that was played; its number on the screen where the angles are not known."""
+    if first_deg is None or trial.angle_deg is None:
+        return trial.direction_shown
+    return 1 if trial.angle_deg == first_deg else 2
 
 
 def _delivery_ratio(trial: Trial) -> float:

@@ -1,4 +1,8 @@
-"""Report of recordings before any model: failed checks, channels and figures."""
+"""Report of recordings before any model: what is wrong, then per recording its checks, channels and figures.
+
+`brief` is the summary of a recording in a sentence. Checks and channels are values of
+`analysis.look.overview`; here they become tables.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -61,7 +65,7 @@ def _sections(overview: Overview, pictures: Sequence[Picture], found: Sequence[O
 
 def _checks(checks: Sequence[Check]) -> Table:
     rows = tuple((check.name, check.level, check.seen, check.do) for check in checks)
-    return Table("What was checked", ("Check", "", "Seen", "What to do"), rows)
+    return Table("What was checked", ("Check", "Result", "Seen", "What to do"), rows)
 
 
 def _channels(overview: Overview) -> Table:

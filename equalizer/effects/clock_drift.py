@@ -1,4 +1,10 @@
-"""Clock drift: commands are sent and responses sampled by two clocks of different rate."""
+"""Clock drift: commands are sent and responses sampled by two clocks of different rate.
+
+y(t) = x(t (1 + ppm 1e-6)): the sample that carries the time t was taken later, at t (1 + ppm 1e-6), where ppm > 0, by a
+clock that runs slow. A file may have been resampled from one clock to the other: `interpolated` is the share of linear
+interpolation in that (0: band-limited, which leaves the spectrum alone), `with_position` whether the position has the
+response's clock (1) or the commands' (0).
+"""
 
 import numpy as np
 
@@ -15,7 +21,7 @@ LONGEST_S = 0.1
 LARGEST_PPM = 2e4
 """Largest drift: beyond it the sample rate is wrong, not the clock."""
 LEAST_SIGMA = 5.0
-"""Least drift in its standard errors for it to be tried."""
+"""Least drift, in its standard errors, for the effect to be tried."""
 
 
 def _read_drifting(

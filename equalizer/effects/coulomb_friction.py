@@ -1,7 +1,8 @@
 """Coulomb friction: a constant force against the motion; at rest it balances any smaller force.
 
 The law is F = -level sgn(v). The simulation replaces the jump at v = 0 by a bristle that slips after 50 nm
-(`equalizer.effects.simulation.dry_friction_kernel`): F = -level in sliding, between -level and level at rest.
+(`equalizer.effects.simulation.dry_friction_kernel`): F = -level sgn(v) in sliding, any force from -level to level at
+rest.
 """
 
 import numpy as np

@@ -27,7 +27,7 @@ LAPSE = 0.02
 """Share of inattentive answers, half of them wrong, as in the other analyses: without it a single lapse at a high level
 could never be undone."""
 TARGET = 0.5 ** (1 / 3)
-"""Share of right answers at the threshold, that of the published staircase."""
+"""Share of right answers at the threshold, lapses apart: that to which the published staircase converges."""
 SAME_BITS = 1e-9
 """Entropies closer than this are equal, and the lower level is played: rounding must not choose."""
 
@@ -61,7 +61,11 @@ def thresholds_db(cap_db: float) -> FloatArray:
 
 
 def share_right(level_db: FloatArray, cap_db: float) -> FloatArray:
-    """P(right) of every threshold and slope (..., thresholds, slopes) at levels of any shape (...)."""
+    """P(right) of every threshold and slope (..., thresholds, slopes) at levels of any shape (...), in dB re 1 N.
+
+    A Weibull curve over newtons, F = 1 - exp(-exp(t0 + slope ln(10)/20 (level - threshold))), from 1/2 to 1:
+    P = lapse / 2 + (1 - lapse) (1 + F) / 2, with t0 so that (1 + F) / 2 is `TARGET` at the threshold.
+    """
     t0 = math.log(-math.log(2.0 - 2.0 * TARGET))
     above = np.asarray(level_db)[..., None, None] - thresholds_db(cap_db)[:, None]
     rest = 0.5 * np.exp(-np.exp(t0 + np.array(SLOPES) * (math.log(10.0) / 20.0) * above))
@@ -80,7 +84,8 @@ def posterior(answered: tuple[Answered, ...], cap_db: float) -> FloatArray:
 
 
 def next_level_db(probability: FloatArray, cap_db: float) -> float:
-    """Never above the cap, whose level is the last of those that are weighed."""
+    """The level (dB re 1 N) after which the least entropy of threshold and slope is expected; never above the cap.
+    probability: (thresholds, slopes), as `posterior` gives it."""
     levels, right = levels_db(cap_db), _table(cap_db)
     left = np.zeros(len(levels))
     for table in (right, 1.0 - right):

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.study import DeviceOption
+from study.cli.session_options import DeviceOption
 
 
 def calibrate(

@@ -9,8 +9,8 @@ from pathlib import Path
 import typer
 
 from protocols.wording.words import Words
+from study.cli.motion_notice import announce
 from study.cli.progress import answer_count
-from study.cli.record import announce
 from study.cli.results import show
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.opening import REAL, needs_real_time

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from study.cli.record import announce
+from study.cli.motion_notice import announce
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
-from study.cli.study import DeviceOption, HandsOffOption
+from study.cli.session_options import DeviceOption, HandsOffOption
 
 
 def contact(

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from study.cli.record import announce, require_confirmation
+from study.cli.motion_notice import announce, require_confirmation
 from study.cli.results import JsonOption
-from study.cli.study import DataOption, DeviceOption, HandsOffOption
+from study.cli.session_options import DataOption, DeviceOption, HandsOffOption
 
 if TYPE_CHECKING:
     from study.session.views.views import DeviceFinding

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from study.cli.record import announce
+from study.cli.motion_notice import announce
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
-from study.cli.study import HandsOffOption
+from study.cli.session_options import HandsOffOption
 
 if TYPE_CHECKING:
     from study.workflows.equalizer.equalize_trajectory import EqualizePlan

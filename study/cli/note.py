@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from study.cli.study import DataOption
+from study.cli.session_options import DataOption
 
 if TYPE_CHECKING:
     from study.store.sessions.archive import SessionFolder

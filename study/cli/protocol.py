@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from study.cli.command_table import Subcommands
-from study.cli.study import DataOption
+from study.cli.session_options import DataOption
 
 app = typer.Typer(
     cls=Subcommands,

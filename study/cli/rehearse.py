@@ -8,7 +8,7 @@ import typer
 from study.cli.results import JsonOption, show
 from study.cli.scheduler import SchedulerOption, cluster_if
 from study.cli.seed import check_seed
-from study.cli.study import ModelOption, ProtocolOption, protocol_or_default
+from study.cli.session_options import ModelOption, ProtocolOption, protocol_or_default
 
 
 def rehearse(

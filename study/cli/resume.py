@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.study import DataOption, DeviceOption, HandsOffOption, KeysOption, PlainOption
+from study.cli.session_options import DataOption, DeviceOption, HandsOffOption, KeysOption, PlainOption
 from study.tui.keys.answer_keys import parse_keys
 
 LOG_NAME = "events.jsonl"

@@ -10,7 +10,7 @@ import typer
 
 from study.cli.results import JsonOption
 from study.cli.screen import columns
-from study.cli.study import DataOption
+from study.cli.session_options import DataOption
 
 if TYPE_CHECKING:
     from study.session.views.archive_views import DiagnosisView, SessionView, Staircase

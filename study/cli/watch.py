@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from study.cli.screen import columns
-from study.cli.study import DataOption
+from study.cli.session_options import DataOption
 
 if TYPE_CHECKING:
     from study.session.watching.requests import Request

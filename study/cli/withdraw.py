@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from study.cli.study import DataOption
+from study.cli.session_options import DataOption
 
 
 def withdraw(

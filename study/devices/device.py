@@ -16,6 +16,13 @@ from study.session.facts.void_reasons import PROGRAM_STALLED
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.limits import Limits
 
+REPLAY = "replay:"
+"""Begins a device's name, before the path of a recording: its handle moves as it once did, independent of the force
+asked for."""
+CALIBRATED = "simulated:"
+"""Begins a device's name, before the path of a calibration: the simulated device with the linkage and the inertia that
+it tells."""
+
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:

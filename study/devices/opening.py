@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from study.devices.admission import HAND_STIMULUS_CAP_N as HAND_STIMULUS_CAP_N
 from study.devices.clock import Clock
-from study.devices.device import Device, DeviceInfo, DeviceSettings
+from study.devices.device import CALIBRATED as CALIBRATED
+from study.devices.device import REPLAY, Device, DeviceInfo, DeviceSettings
 from study.devices.force_dimension.models import MODELS
 from study.errors import DeviceError
 from study.session.views.views import DeviceFinding
@@ -42,14 +43,6 @@ FRICTIONLESS = "simulated-frictionless"
 
 SIMULATIONS = (SIMULATED, FRICTIONLESS)
 """Those that need no real clock."""
-
-
-REPLAY = "replay:"
-"""Before the path of a recording: its handle moves as it once did, independent of the force asked for."""
-
-
-CALIBRATED = "simulated:"
-"""Before the path of a calibration: the simulated device with the linkage and the inertia that it tells."""
 
 
 def needs_real_time(name: str) -> bool:

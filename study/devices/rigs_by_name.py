@@ -5,10 +5,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from study.devices.device import DeviceSettings
+from study.devices.device import CALIBRATED, REPLAY, DeviceSettings
 from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.rigs import force_dimension_rig
-from study.devices.opening import CALIBRATED, REPLAY
 from study.devices.rig import CompiledRig, Rig
 from study.devices.simulated.omega3 import build_omega3
 from study.devices.simulated.own_linkage import fit_linkage

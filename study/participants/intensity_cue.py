@@ -30,7 +30,7 @@ class IntensityCue:
 
     name: str
     difference_db: float = 3.0
-    """Level of direction 1 as delivered, above that of direction 2."""
+    """Level, as delivered, of the direction with the number 1 on the screen, above that of the other."""
     noise_db: float = 1.0
     """Standard deviation of one judgement of strength; about the difference limen of vibration."""
     detection_n: float = 0.1

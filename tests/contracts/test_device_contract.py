@@ -11,7 +11,9 @@ import pytest
 from equalizer.signals.joining import join
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
-from study.devices.opening import open_device
+from study.devices.force_dimension.models import MODELS
+from study.devices.opening import DEVICES, FRICTIONLESS, open_device
+from study.devices.rigs_by_name import RIGS_BY_NAME
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
 from study.store.formats.recording_file import write_recording
@@ -27,6 +29,8 @@ KINDS = (
     "replay of a recording",
     "driver of the docs",
 )
+KIND_OF = {"simulated": KINDS[0], "simulated-frictionless": KINDS[0], **dict.fromkeys(MODELS, "driver on the stub")}
+"""By which kind each name of `--device` is tested here."""
 
 
 @pytest.fixture
@@ -81,6 +85,11 @@ def feel(device, clock, seconds: float) -> None:
     for _ in range(round(seconds / 0.1)):
         clock.sleep(0.1)
         device.keep_alive()
+
+
+def test_each_driver_that_can_be_opened_is_tested_here():
+    assert set(RIGS_BY_NAME) == {*DEVICES, FRICTIONLESS} == set(KIND_OF)
+    assert set(KIND_OF.values()) <= set(KINDS)
 
 
 def test_it_says_what_it_is(device):

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 from typer.main import get_command
 
 from equalizer.plant.identified_model import IdentifiedModel
@@ -38,12 +39,31 @@ def test_help_names_people_by_their_part():
     assert [text for text in said if VAGUE.search(text)] == []
 
 
-def test_the_rendering_loop_of_the_equalizer_page_runs(plants, tmp_path, monkeypatch):
-    plant = plants.omega_like()
+@pytest.fixture
+def plant(plants, tmp_path, monkeypatch):
+    """A plant whose model is the file model.h5 of the folder in which the pages are run."""
+    known = plants.omega_like()
     channels = ("fx", "fy", "fz"), ("ax", "ay", "az")
-    model = IdentifiedModel(plant.A, plant.B, plant.C, np.zeros((3, 3)), 1000.0, (5.0, 35.0), "N", "m/s^2", *channels)
+    model = IdentifiedModel(known.A, known.B, known.C, np.zeros((3, 3)), 1000.0, (5.0, 35.0), "N", "m/s^2", *channels)
     write_identified_model(tmp_path / "model.h5", model)
     monkeypatch.chdir(tmp_path)
+    return known
+
+
+def test_the_forces_of_the_python_page_are_computed(plant):
+    code = re.findall(r"```python\n(.*?)```", (DOCS / "python.md").read_text("utf-8"), re.DOTALL)
+    (equalized,) = [part for part in code if "equalize(" in part]
+    time_s = np.arange(1000) / 1000.0
+    wanted = np.zeros((1000, 3))
+    wanted[:, 0] = np.sin(np.pi * time_s) ** 2 * np.sin(2 * np.pi * 20.0 * time_s)
+    names: dict = {"wanted": wanted}
+    exec(equalized, names)
+    assert names["found"].forces.samples.shape == (1000, 3)
+    assert names["found"].error < 0.05
+    np.testing.assert_allclose(names["model"].A, plant.A)
+
+
+def test_the_rendering_loop_of_the_equalizer_page_runs(plant):
     (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "equalizer.md").read_text("utf-8"), re.DOTALL)
     names: dict = {}
     exec(code, names)

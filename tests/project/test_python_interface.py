@@ -6,7 +6,11 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import equalizer
+import study
 
 PACKAGES = ("protocols", "equalizer", "analysis", "study")
 ROOT = Path(__file__).parents[2]
@@ -42,3 +46,37 @@ def test_an_import_alone_loads_nothing_heavy(name):
 def test_a_name_that_is_not_there_is_an_attribute_error(name):
     with pytest.raises(AttributeError, match="nothing_of_the_kind"):
         _ = import_module(name).nothing_of_the_kind
+
+
+READERS = ("read_recording", "read_trials", "read_mechanical_model", "read_identified_model")
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_file_that_is_named_by_text_and_is_not_there_is_said_in_words(reader, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(study.StudyError, match="nowhere"):
+        getattr(study, reader)("nowhere.file")
+
+
+def test_a_file_that_is_named_by_text_is_written_and_read(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    force, motion = (
+        equalizer.Signal(np.ones((50, 1)), 1000.0, *of) for of in (("force", "N", ("fx",)), ("position", "m", ("x",)))
+    )
+    recording = equalizer.Recording("cart", force, motion)
+    mechanical = equalizer.MechanicalModel("cart", "position", *(np.eye(1) for _ in range(5)))
+    matrices = np.eye(2) / 2, np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1))
+    identified = equalizer.IdentifiedModel(*matrices, 1000.0, (5.0, 35.0), "N", "m", ("fx",), ("x",))
+    study.write_recording("cart.h5", recording)
+    study.write_mechanical_model("cart.toml", mechanical)
+    study.write_identified_model("model.h5", identified)
+    assert study.read_recording("cart.h5").command.channels == ("fx",)
+    assert study.read_mechanical_model("cart.toml").name == "cart"
+    assert study.read_identified_model("model.h5").band_hz == (5.0, 35.0)
+
+
+def test_a_session_may_be_filed_under_a_folder_that_is_named_by_text(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = study.simulate_session(study.read_study_protocol("direction_training"), "data")
+    assert study.read_trials(str(folder.path / "trials.csv"))
+    assert study.analyze_data("data", "results").report.exists()

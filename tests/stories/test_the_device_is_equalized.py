@@ -21,7 +21,7 @@ from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.rig import CompiledRig
 from study.devices.safe import SafeDevice
 from study.session.stimulus.limits import limits_of_recording
-from study.session.stimulus.recording_plan import pieces
+from study.session.stimulus.recording_pieces import pieces
 
 RATE_HZ, LOOP = 1000.0, 10_000
 LINES_HZ = np.fft.rfftfreq(LOOP, 1 / RATE_HZ)

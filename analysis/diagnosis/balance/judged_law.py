@@ -16,11 +16,13 @@ DRY_FRICTIONS = {
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
     "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
 }  # fmt: skip
+"""Laws of dry friction, which act alike where a recording moves in a single way."""
 FAMILIES = (
     DRY_FRICTIONS | {"quadratic_damping"},
     {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
 )  # fmt: skip
-"""Effects that may form a class, because they act alike. Of different families, nothing is named."""
+"""Effects that act alike. Where a law and its equally good rivals are of one family, it is named with them as its
+class; where a rival is of another family, nothing is named. An effect that is not listed is a family of its own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,8 @@ Here: nonlinear springs, end stops, backlash, gravity torque, cogging, linear dy
 damping are in `friction_laws`.
 
 A law's force is linear in its weights: sum of weight times column, with columns from the measured motion. The grids
-span the recording's speeds, travel and band, so that no starting values are needed.
+span the recording's speeds, travel and band, so that no starting values are needed. A column is in SI units; its sign
+is that of a force which resists the motion, as mass, damping and stiffness of the balance do.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,6 +27,24 @@ from analysis.diagnosis.balance.law import (
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.effects.gravity_torque import LEAST_TRAVEL_RAD
 from equalizer.signals.signal import FloatArray
+
+# The search for pitches of a force that is periodic in the position. By hand.
+LINE_SPACING = 0.35
+"""Spacing of the lines, over 1 / travel: a peak of a force that is periodic over the whole travel is about 1 / travel
+wide."""
+MOST_LINES = 600
+"""Lines that are looked at, from the longest pitch down: pitches below 1 / 211 of the travel, or of a shaft that turns
+below 1 / 601 of a turn, are not searched."""
+MOST_SAMPLES = 6000
+"""Samples that the lines are computed from, evenly taken."""
+MOST_PITCHES = 4
+"""Lines that are kept, the strongest ones."""
+STOP_AT = (0.02, 0.05, 0.1, 0.2)
+"""Places of an end stop that are tried: distances from either end of the travel, over the travel."""
+HALF_GAPS = tuple(np.geomspace(0.01, 0.3, 6).tolist())
+"""Half gaps of a backlash that are tried, over the travel."""
+MODE_RATIOS, MODE_HZ = (0.02, 0.1, 0.4), tuple(np.geomspace(0.02, 1.2, 12).tolist())
+"""Damping ratios, and frequencies over the end of the band, of an extra mode that are tried."""
 
 
 def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
@@ -70,21 +89,22 @@ def cogging_law(channel: int, pitch: float, of: Scales) -> Law:
 def likely_pitches(
     motions: Sequence[Motion], remainders: Sequence[FloatArray], channel: int, of: Scales
 ) -> list[float]:
-    """Pitches of the four strongest lines in the spectrum of the residual force over the position, the strongest first.
-    remainders: per motion, (kept samples,)."""
+    """Pitches (m or rad) of the strongest lines in the spectrum of the residual force over the position, the strongest
+    first. remainders: per motion, (kept samples,). A shaft that turns has lines at whole numbers per turn alone."""
     q = np.concatenate([each.position[:: each.step, channel][each.valid_samples(each.fit)] for each in motions])
     residual = np.concatenate([r[each.valid_samples(each.fit)] for each, r in zip(motions, remainders, strict=True)])
     longest = _longest_pitch(of)
     # Shorter pitches give frequencies above the band's end at the usual speed.
-    shortest = max(of.speed / of.band_hz, longest / 400)
+    shortest = of.speed / of.band_hz
     if shortest >= longest or not len(residual):
         return []
-    finest = 1 / (2 * np.pi) if of.turns else 1 / of.travel
-    lines = np.arange(1 / longest, 1 / shortest, finest * (1.0 if of.turns else 0.35))[:600]
-    every = max(len(q) // 6000, 1)
+    spacing = 1 / (2 * np.pi) if of.turns else LINE_SPACING / of.travel
+    lines = 1 / longest + spacing * np.arange(MOST_LINES)
+    lines = lines[lines * shortest < 1]
+    every = max(len(q) // MOST_SAMPLES, 1)
     power = np.array([abs(np.mean(residual[::every] * np.exp(-2j * np.pi * line * q[::every]))) for line in lines])
     peaks = [k for k in range(len(power)) if power[k] == power[max(k - 2, 0) : k + 3].max()]
-    return [float(1 / lines[k]) for k in sorted(peaks, key=lambda k: -power[k])[:4]]
+    return [float(1 / lines[k]) for k in sorted(peaks, key=lambda k: -power[k])[:MOST_PITCHES]]
 
 
 def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
@@ -99,13 +119,14 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
         return
     yield Law("hardening_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 3, name_weights("k3"))
     yield Law("asymmetric_stiffness", c, (), lambda m, _: m.position[:, [c]] ** 2, name_weights("k2"))
-    for share in (0.02, 0.05, 0.1, 0.2):
+    for share in STOP_AT:
         for end, side in ((of.high - share * of.travel, 1.0), (of.low + share * of.travel, -1.0)):
             yield Law(
                 "end_stop", c, (float(end),),
                 _stop_columns(c, side), _stop_values(side), bounded=((of.low, of.high),),
             )  # fmt: skip
-    for half in of.travel * np.geomspace(0.01, 0.3, 6):
+    for half in of.travel * np.array(HALF_GAPS):
+        # Beside the balance's own spring k x this leaves k (x - clip(x)): a spring that acts beyond the gap alone.
         yield Law(
             "backlash", c, (float(half),), lambda m, n: -np.clip(m.position[:, [c]], -n[0], n[0]),
             lambda w, n, mass: {"gap": 2 * n[0], "contact_stiffness": float(w[0])} if w[0] > 0 else None,
@@ -131,17 +152,19 @@ def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
     """Pose-dependent inertia, an extra mode on a grid of frequencies and damping ratios, and amplifier lag along
     channel c."""
     if not of.turns:
+        # Lagrange's equation of a mass M (1 + c x): beside M a, the force M c (x a + v² / 2).
         yield Law(
             "pose_dependent_inertia", c, (),
             lambda m, _: m.position[:, [c]] * m.acceleration[:, [c]] + 0.5 * m.velocity[:, [c]] ** 2,
             lambda w, n, mass: {"per_m": float(w[0] / mass), "speed_share": 0.5} if mass > 0 else None,
         )  # fmt: skip
-    for ratio in (0.02, 0.1, 0.4):
-        for f in of.band_hz * np.geomspace(0.02, 1.2, 12):
+    for ratio in MODE_RATIOS:
+        for f in of.band_hz * np.array(MODE_HZ):
             yield Law(
                 "extra_mode", c, (float(f), ratio), lambda m, n: _mode_force(m, c, n), _mode_values, linear=True,
                 bounded=((0.005 * of.band_hz, 1.5 * of.band_hz), (0.002, 1.0)),
             )  # fmt: skip
+    # A first-order lag of the force needs (1 + T s) times it; of that, T s M a is the part that no base term holds.
     yield Law(
         "amplifier_lag", c, (), lambda m, _: filter_from_rest(m.acceleration[:, [c]], m.rate_hz, lambda s: s),
         lambda w, n, mass: {"time_constant": float(w[0] / mass)} if mass > 0 and w[0] > 0 else None, linear=True,

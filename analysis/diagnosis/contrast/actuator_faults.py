@@ -19,7 +19,7 @@ import numpy as np
 from analysis.diagnosis.contrast.fault import (
     ColumnChange,
     Fault,
-    Numbers,
+    ParametersOf,
     Rows,
     Undo,
     Variant,
@@ -110,7 +110,7 @@ def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
     yield replace(axis.fault("force_gain_drift", drifts), varies=True, simpler=("force_gain",))
 
 
-def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
+def _gain_drift(axis: _Axis, begun: float, parameters_of: ParametersOf) -> Variant:
     def ramp(part: Part, count: int) -> FloatArray:
         """(count, 1): the gain at `count` evenly spaced times of a part, as rows may be decimated."""
         gain = 1 + drift_shape(part, begun)
@@ -121,7 +121,7 @@ def _gain_drift(axis: _Axis, begun: float, numbers: Numbers) -> Variant:
         command[:, [axis.number]] *= ramp(part, len(command))
         return replace(part, command=command)
 
-    return Variant((undo,), numbers, -0.9, 20.0, column_change=lambda x, rate, part: x * ramp(part, len(x)))
+    return Variant((undo,), parameters_of, -0.9, 20.0, column_change=lambda x, rate, part: x * ramp(part, len(x)))
 
 
 def drift_shape(part: Part, begun: float) -> FloatArray:

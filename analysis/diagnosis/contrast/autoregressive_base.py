@@ -46,7 +46,7 @@ class AutoregressiveBase:
         return (np.arange(width) > self.order * self.responses) & (np.arange(width) < width - 1)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
-        """Per part (n,): mask of the rows whose own and past samples are known, without the first two and the last two. A
+        """Per part (n,): mask of the rows whose own and past samples are known, without the first two and last two. A
         sample that was lost between those that decimation keeps is interpolated and low-passed with its neighbours, and
         does not count as lost."""
         found = []

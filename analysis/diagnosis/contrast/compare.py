@@ -185,7 +185,7 @@ def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, pl
     """The fault with its values and their standard errors, its gain, and its gains where it cannot be: between
     stretches of one set. plain: the fit with nothing undone. samples: of both sets, over all bases."""
     fit, fault, variant, pairs = found
-    values = variant.values(fit.sizes)
+    values = variant.parameters_of(fit.sizes)
     folds = _leave_out_sixths(pairs)
     fits = [fit_sizes(kept, variant) for kept in folds]
     held_out = sum(held_out_error(kept, each.sizes, out) for out, kept, each in zip(SIXTHS, folds, fits, strict=True))
@@ -221,7 +221,7 @@ def _standard_errors(
 ) -> dict[str, float]:
     """Standard error of each value of a fault, from its sizes with each sixth of either set left out: variances of both
     sets and of the spacing of the variants add up."""
-    sets = [[variant.values(sizes) for sizes in each] for each in (without_faulty, without_clean)]
+    sets = [[variant.parameters_of(sizes) for sizes in each] for each in (without_faulty, without_clean)]
     return {
         name: float(
             np.sqrt(variant.grid_error**2 + sum(_jackknife_variance([fold[name] for fold in side]) for side in sets))

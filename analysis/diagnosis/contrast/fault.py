@@ -10,19 +10,13 @@ from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import FloatArray
 
 Undo = Callable[[Part], Part]
-
-
+"""Maps a part to the part as it would have been without a fault of size 1."""
 ColumnChange = Callable[[FloatArray, float, Part], FloatArray]
 """Maps columns (n, k) of a part that predict a command, at a rate in Hz, to those that predict the faulty command."""
-
-
-Numbers = Callable[[FloatArray], dict[str, float]]
-
-
+ParametersOf = Callable[[FloatArray], dict[str, float]]
+"""Maps sizes (sizes,) of a variant to the parameters of the effect, in SI units."""
 Curve = Callable[[FloatArray], FloatArray]
-"""Maps readings (n,) to readings."""
-
-
+"""Maps readings (n,) to readings, one by one: a sensor's gain, saturation or nonlinearity."""
 EVERY = -1
 """Site number of a fault of all channels."""
 
@@ -33,8 +27,8 @@ class Variant:
 
     undo: tuple[Undo, ...]
     """One function per size, each undoing a fault of size 1."""
-    values: Numbers
-    """Parameters of the fault from its sizes (steps,)."""
+    parameters_of: ParametersOf
+    """Parameters of the fault from its sizes."""
     least: float = -np.inf
     most: float = np.inf
     """Bounds of each size: about 1 where undoing is not linear in the size."""
@@ -103,6 +97,6 @@ def fix_size(variant: Variant, grid_error: float) -> Variant:
     return replace(variant, least=1.0, most=1.0, about=None, grid_error=grid_error)
 
 
-def proportional_parameter(name: str, of_one: float = 1.0) -> Numbers:
+def proportional_parameter(name: str, of_one: float = 1.0) -> ParametersOf:
     """A fault's parameter in proportion to its only size. of_one: the parameter at size 1."""
     return lambda sizes: {name: of_one * float(sizes[0])}

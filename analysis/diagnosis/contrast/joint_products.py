@@ -111,9 +111,10 @@ class Fit:
 
 def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
     """The sizes with the least error, every base fitted to both sides. variant: None = no fault."""
-    sizes = np.zeros(0) if variant is None else _starting_sizes(variant)
-    for _ in range(0 if variant is None else ROUNDS):
-        assert variant is not None
+    if variant is None:
+        return _fit_at(pairs, np.zeros(0))
+    sizes = _starting_sizes(variant)
+    for _ in range(ROUNDS):
         gradients, grams = np.zeros(len(sizes)), np.zeros((len(sizes), len(sizes)))
         for pair in pairs:
             gradient, gram = _newton_terms(pair, sizes)
@@ -125,6 +126,10 @@ def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
             sizes = moved
             break
         sizes = moved
+    return _fit_at(pairs, sizes)
+
+
+def _fit_at(pairs: Sequence[Pair], sizes: FloatArray) -> Fit:
     return Fit(sizes, sum((_errors(pair, sizes) for pair in pairs), np.zeros(1)))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.balance.friction_laws import SHARP
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.contrast.fault import Fault, Numbers, Undo, Variant, proportional_parameter
+from analysis.diagnosis.contrast.fault import Fault, ParametersOf, Undo, Variant, proportional_parameter
 from analysis.diagnosis.contrast.part import Part
 from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.signals.signal import FloatArray
@@ -100,8 +100,8 @@ def _asymmetric_friction(axis: _Axis, wide: float) -> Variant:
 
 
 def _presliding_variant(axis: _Axis, give: float) -> Variant:
-    numbers: Numbers = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / give}  # noqa: E731
-    return Variant((axis.of(lambda m: bristle_bend(m.position[:, axis.channel], give)),), numbers, least=0.0)
+    parameters_of: ParametersOf = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / give}  # noqa: E731
+    return Variant((axis.of(lambda m: bristle_bend(m.position[:, axis.channel], give)),), parameters_of, least=0.0)
 
 
 def _cogging_variant(axis: _Axis, pitch: float) -> Variant:
@@ -128,6 +128,6 @@ def _stop(axis: _Axis, side: float, reach: float) -> Variant:
     return Variant((undo,), _stop_parameters(axis.middle + side * reach, side), least=0.0)
 
 
-def _stop_parameters(position: float, side: float) -> Numbers:
+def _stop_parameters(position: float, side: float) -> ParametersOf:
     beyond = {} if side * position > 0 else {"side": side}
     return lambda s: {"position": position, "stiffness": float(s[0]), **beyond}

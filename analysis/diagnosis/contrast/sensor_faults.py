@@ -18,7 +18,7 @@ from analysis.diagnosis.contrast.fault import (
     EVERY,
     Curve,
     Fault,
-    Numbers,
+    ParametersOf,
     Rows,
     Undo,
     Variant,
@@ -191,17 +191,17 @@ def _lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Vari
     shrinks by the geometric mean of the low pass's gain (Kolmogorov's formula), which is 1 - kept."""
     kept = float(np.exp(-samples / (time_s * rate_hz)))
     undo = channel.of(lambda y, rate: (y - kept * np.concatenate([y[:1]] * samples + [y])[: len(y)]) / (1 - kept))
-    numbers: Numbers = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
+    parameters_of: ParametersOf = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
     about = lambda size: _lag(channel, size * time_s, rate_hz, samples)  # noqa: E731
-    return Variant((undo,), numbers, *AROUND, 1 - kept, about=about)
+    return Variant((undo,), parameters_of, *AROUND, 1 - kept, about=about)
 
 
 def _nonlinearity(channel: _Channel, share: float, power: int, number: str) -> Variant:
     top = channel.top
     curve: Curve = lambda y: _invert_power_law(y / top, share, power) * top  # noqa: E731
     about = lambda size: _nonlinearity(channel, size * share, power, number)  # noqa: E731
-    numbers = proportional_parameter(number, share / top ** (power - 1))
-    return Variant((channel.of(lambda y, rate: curve(y)),), numbers, *WIDELY, curve=curve, about=about)
+    parameters_of = proportional_parameter(number, share / top ** (power - 1))
+    return Variant((channel.of(lambda y, rate: curve(y)),), parameters_of, *WIDELY, curve=curve, about=about)
 
 
 def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:

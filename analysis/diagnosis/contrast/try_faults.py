@@ -47,7 +47,7 @@ class TriedFaults:
 
 
 def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], time_left: TimeBudget) -> TriedFaults:
-    """Tries every fault on all compared bases, in order, until the time runs out."""
+    """Tries the faults in order, each on all bases together, until the time runs out."""
     clean = [compared.grams(compared.clean, []).blocks for compared in compared_bases]
     bare = [
         Pair(compared.grams(compared.faulty, []), ALL, tuple(own), (compared.clean.scale / compared.faulty.scale) ** 2)

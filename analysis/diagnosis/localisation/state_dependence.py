@@ -1,4 +1,10 @@
-"""Tests on which states a mismatch depends, for the missing force along each axis or a sensor's error."""
+"""Tests on which states a mismatch depends, for the missing force along each axis or a sensor's error.
+
+A state is a variable of the motion or of the signals: position, velocity, command, response, time. Each test asks
+whether the mismatch is larger in a region of it, or follows its sign (`state_regions`); its p-value is multiplied by
+the number of all tests (Bonferroni), and a dependence is stated where it is below `FALSE_DISCOVERY_RATE` and says more
+than where the device was most of the time.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,7 +15,7 @@ from analysis.diagnosis.data.spectral_lines import Band
 from analysis.diagnosis.localisation.block_permutation import IntArray
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
-from analysis.diagnosis.localisation.state_regions import Disturbance, State, StateRegion, state_regions
+from analysis.diagnosis.localisation.state_regions import MIDDLING, Disturbance, State, StateRegion, state_regions
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, STATE_CROWDED, STATES_NAMED
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import axis_letter
@@ -20,6 +26,10 @@ from equalizer.signals.unit_system import UnitSystem
 
 _SEED = 20
 """Seed of the permutations: the same recording gives the same result."""
+FORCE_TESTS = 6
+"""Tests along one axis: position and velocity by size and by sign, command and time by size."""
+ERROR_TESTS = 2
+"""Tests of one response channel: response and time, by size."""
 _DRIVEN = 0.02
 """Least rms of an axis's command, relative to the strongest segment, for the axis to count as driven."""
 
@@ -48,7 +58,7 @@ def force_states(
         worst = max(mine, key=lambda cell: cell.in_noise)
         seen = state_regions(Disturbance(evidence.axis_force[:, k], strata, command), states, _SEED)
         found.append([StateMismatch(worst.output, channel, _band(mine), region) for region in seen])
-    return _correct_p_values(found, looked_at=6)
+    return _correct_p_values(found, FORCE_TESTS)
 
 
 def error_states(
@@ -72,12 +82,13 @@ def error_states(
         )
         seen = state_regions(Disturbance(reading - evidence.predicted[:, k], strata, reading), states, _SEED)
         found.append([StateMismatch(channel, inputs, _band(mine), region) for region in seen])
-    return _correct_p_values(found, looked_at=2)
+    return _correct_p_values(found, ERROR_TESTS)
 
 
-def _correct_p_values(found: Sequence[Sequence[StateMismatch]], looked_at: int) -> tuple[StateMismatch, ...]:
-    """Bonferroni correction over all axes or channels and the regions of each; only significant ones are kept."""
-    tests = looked_at * len(found)
+def _correct_p_values(found: Sequence[Sequence[StateMismatch]], tests_of_each: int) -> tuple[StateMismatch, ...]:
+    """Bonferroni correction over all axes or channels, with tests_of_each tests; only significant ones are kept,
+    of each axis or channel those with the largest share."""
+    tests = tests_of_each * len(found)
     kept = []
     for group in found:
         raised = [
@@ -92,7 +103,8 @@ def _correct_p_values(found: Sequence[Sequence[StateMismatch]], looked_at: int) 
 
 
 def _is_informative(region: StateRegion) -> bool:
-    if region.words.startswith("at middling"):
+    """Whether a region says more than where most samples are. A middle of a state has no meaning in mechanics."""
+    if region.words.startswith(MIDDLING):
         return False
     return region.by == "sign" or region.share > STATE_CROWDED * region.occupied
 

@@ -23,6 +23,8 @@ _LEAST_SHARE = 0.05
 _TINY = np.finfo(np.float64).tiny
 _LEAST_EXPECTED = 1e-9
 """Least expected power of a bin, relative to the mean; bins below it, such as those at rest, are not tested."""
+MIDDLING = "at middling"
+"""Begins the words of a region that holds neither small nor large values of a state."""
 _READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
 
 
@@ -72,8 +74,12 @@ class StateRegion:
 def state_regions(
     disturbance: Disturbance, states: Sequence[State], seed: int, permutations: int = PERMUTATIONS
 ) -> tuple[StateRegion, ...]:
-    """Smallest p-value first, then largest share; only significant regions. p-values are of single tests, by block
-    permutation within segments; they depend on the seed in their third digit.
+    """Regions with a concentration above `_CONCENTRATED`, or bin means that explain `_LEAST_SHARE` of the power: the
+    smallest p-value first, then the largest share. p-values are of single tests, by block permutation within segments,
+    and not compared with any limit here; they depend on the seed in their third digit.
+
+    Tested are the size for every state, over its magnitude where it has a sign of its own, and beside it the sign for
+    position and velocity.
 
     Raises ValueError where a state has another length than the disturbance.
     """
@@ -220,7 +226,7 @@ def region_in_words(
         return f"near {symbol} = {typeset(f'{centre * factor:.2g}')} {named}".rstrip()
     if low and not high:
         return f"near {symbol} = 0" if kind == "velocity" else f"where |{symbol}| is small"
-    return f"where |{symbol}| is large" if high else f"at middling |{symbol}|"
+    return f"where |{symbol}| is large" if high else f"{MIDDLING} |{symbol}|"
 
 
 def dependence_in_words(symbol: str, means: FloatArray) -> str:

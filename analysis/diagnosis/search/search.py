@@ -2,7 +2,9 @@
 
 Theory of operation.
 
-1. `add_effects` selects effects forward, on the samples to fit and to choose by.
+1. `add_effects` selects effects forward, on the samples to fit and to choose by. Once a second one is found, the first
+   is exchanged for another of its family that gains enough, and after the last for any other that fits better
+   (`revise_selection`).
 2. Backward elimination (`prune`) removes what selection added and the result does not need: effects without which the
    others, refitted, fit as well; effects that take too little of the mismatch; effects whose parameters the data
    do not determine (`identifiability`: the interval of the only amplitude, or its profile likelihood, contains zero).

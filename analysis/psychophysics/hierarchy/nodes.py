@@ -23,12 +23,16 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """How many nodes there are of each kind."""
+    """Number of nodes of each kind."""
 
     shared: int
+    """Outer, of the deviation u."""
     slope: int
+    """Outer, of the log-slope b."""
     criterion: int
+    """Outer, of the criterion c."""
     threshold: int
+    """Inner, of the threshold at each frequency."""
 
 
 COARSE, FINE, FIXED = Counts(3, 5, 3, 5), Counts(5, 5, 3, 7), Counts(5, 7, 3, 7)
@@ -37,8 +41,8 @@ Where they do not settle, because a person's distribution has two maxima, there 
 
 
 LEAST_SHARE = 1e-4
-"""Of the variance of the nodes themselves, added to that of the distribution: it is never 0, as it would be where all
-weight falls on one node."""
+"""Share of the variance of the nodes themselves that is added to that of the distribution: it is never 0, as it would
+be where all weight falls on a single node. By hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,16 +77,21 @@ class Nodes:
 
 @dataclass(frozen=True, slots=True)
 class Population:
-    """The parameters of a `Layout`, by name: standard deviations and lapse rate themselves, the slope as logarithm."""
+    """The population's parameters (those of a `Layout`), by name and in their own units."""
 
     means: FloatArray
-    """(k,), dB"""
+    """(k,): mean threshold at each frequency, dB."""
     shared_sd: float
+    """Between people, of the deviation that a person has at all frequencies, dB."""
     own_sd: float
+    """Of a person's further deviation at each single frequency, dB."""
     slope: float
+    """Mean of the log-slope b."""
     slope_sd: float
     criterion_sd: float
+    """Of the criterion c, in units of d'; its mean is 0."""
     lapse: float
+    """Share of lapses, the same for all people."""
 
     @staticmethod
     def of(parameters: FloatArray, k: int) -> "Population":

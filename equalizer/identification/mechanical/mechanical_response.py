@@ -1,7 +1,16 @@
 """Frequency response of a mechanical model, sampled exactly as recordings are.
 
-By the poles of M a + D v + K q = B u: the response of each to a held command has a closed form, so that a line costs a
-product of small matrices. `response[k]` is taken just before `command[k]` is written, as in `signals.recording`.
+By the poles p of M a + D v + K q = B u (the actuator's lag with them): each is a state x' = p x + u, whose response to
+a held command has a closed form, so that a line costs a product of small matrices. With z = e^(s T), T the sample
+period, and E(t) the integral of e^(p tau) over 0 < tau < t,
+
+    zero-order hold, delay k T + d, 0 <= d < T:  z^-k (E(T - d) + e^(p (T - d)) E(d) / z) / (z - e^(p T))
+    linear between samples:                      (E(T) + R (z - 1)) / (z - e^(p T)),  R the response to a ramp over T
+    band-limited:                                1 / (s - p)
+
+`response[k]` is taken just before `command[k]` is written, as in `signals.recording`.
+
+Reference: Franklin, Powell and Workman, Digital Control of Dynamic Systems (1998), chapters 4 and 6.
 """
 
 from dataclasses import dataclass
@@ -89,7 +98,8 @@ def _sum_poles(answers: ComplexArray, outputs: ComplexArray, inputs: ComplexArra
 
 
 def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> ComplexArray:
-    """(lines,): y += (1 - exp(-2 pi f / rate)) (x - y)."""
+    """(lines,): response of the sensor's low pass y += (1 - exp(-2 pi f / rate)) (x - y), f its bandwidth; 1 without
+    one."""
     if not bandwidth_hz:
         return np.ones(len(z), dtype=np.complex128)
     left = np.exp(-2 * np.pi * bandwidth_hz / rate_hz)
@@ -108,7 +118,8 @@ def _append_input_lag(
 def pole_responses(
     poles: ComplexArray, z: ComplexArray, rate_hz: float, hold: Hold, delay_s: float
 ) -> tuple[ComplexArray, ComplexArray]:
-    """(lines, poles), (lines,): response of each pole, and of the direct feedthrough, to a held command."""
+    """(lines, poles), (lines,): response of each pole, and of the direct feedthrough, to a held command; as above. z:
+    (lines,), on the unit circle, none at 1."""
     step, column = 1 / rate_hz, z[:, None]
     # A fit may try an unstable model: the growth per sample is limited, so that its response stays finite.
     poles = np.minimum(poles.real, _FASTEST_GROWTH * rate_hz) + 1j * poles.imag

@@ -1,7 +1,7 @@
-"""Loop that plays forces once a millisecond, and its records.
+"""The loop that plays forces once a millisecond, and its records. A tick: wait, sense, govern, write, tell telemetry.
 
-`realtime_drive` runs on the wall clock (its `Glances` are readings while nothing moves), `virtual_drive` on a simulated
-one; `runner` steps a compiled device through the governor, blocks of ticks at once, `stepped_runner` one that is driven
-from Python (its `Standby` is the thread that does one last thing when a driver hangs); `recorded_run` and
-`last_reading` are their results. Begin at `runner.py`.
+Of a real device `realtime_drive` is the thread on the wall clock, in the scheduling class of `real_time_class`; where
+the driver has compiled halves, `compiled_drive` runs its ticks (`compiled_ticks` hands it the arrays), else
+`stepped_runner` from Python. Of a simulated one `virtual_drive` is the clock, and `runner` steps device and governor in
+blocks of ticks. `recorded_run` and `last_reading` are what comes out. Begin at `runner.py`, then `compiled_drive.py`.
 """

@@ -64,6 +64,11 @@ _ATTEND = types.int64(SENSE, WRITE, TICK, PUBLISH, MISS, _RIG, _GOVERNOR, _COURS
 def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
     sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
+    """A tick: sense, note its time, decide the force (`govern.tick`), write it, publish it to telemetry.
+
+    Returns `GOES_ON`, `OVER` where the force is off for good, or the driver's code of an error. The flags `DECIDING`
+    and `WRITING` tell the watching thread where a tick hangs.
+    """
     calls, cells, samples = rig
     state, settings, loop, buffer, force, ring, _nothing = governor
     flags, reading, seen = loop_state

@@ -1,7 +1,7 @@
 """Inventory of a folder of real recordings: sub-folders of recordings with maps that say how to read them.
 
-A recording is diagnosed unless its map says that it only tests what another one gave; one that was made after a change
-of the device is diagnosed against that from before it.
+A map may also say that a recording only tests another's diagnosis (`tests`), and that two were made before and after a
+change of the device (`pair`); see `[diagnosis]` in docs/importing.md.
 """
 
 from collections.abc import Sequence
@@ -99,15 +99,15 @@ def _recordings(folder: Path, found: Sequence[FoundMap]) -> list[RealRecording]:
     """The recordings of a sub-folder that are to be diagnosed. found: all of its recordings with their maps."""
     made = []
     for each in found:
-        if each.source.map.diagnosis.tests and any(_tests(each, other) for other in found):
+        if each.source.map.diagnosis.tests and any(_is_test_of(each, other) for other in found):
             continue
-        tests = tuple(other for other in found if _tests(other, each))
+        tests = tuple(other for other in found if _is_test_of(other, each))
         before, changed = _find_pair(each, found)
         made.append(RealRecording(folder, each, tests, before, changed))
     return made
 
 
-def _tests(test: FoundMap, base: FoundMap) -> bool:
+def _is_test_of(test: FoundMap, base: FoundMap) -> bool:
     """Whether `test` only tests what was found in `base`. With one recording per file, the file names must agree up
     to the first underscore."""
     wanted = test.source.map.diagnosis.tests
@@ -120,8 +120,8 @@ def _tests(test: FoundMap, base: FoundMap) -> bool:
 
 
 def _find_pair(found_map: FoundMap, found: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
-    """The recording from before the change after which this one was made, and the change in words; None and no words
-    where the map names no such pair, or that recording is missing."""
+    """The recording before a change of the device and the change in words, as the map states; None and nothing where
+    the map states none, or that recording is not there."""
     for pair in found_map.source.map.diagnosis.pair:
         if found_map.files[0].match(pair.after):
             before = next(

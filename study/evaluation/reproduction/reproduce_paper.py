@@ -6,7 +6,7 @@ from pathlib import Path
 
 from analysis.evaluation.reproduction.document import UsedModel
 from analysis.evaluation.reproduction.measured_device import MeasuredDevice
-from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
+from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids, sensor_frame
 from analysis.psychophysics.study_analysis import analyse_study
 from equalizer.identification.frequency_response.coupling_onset import coupling_onset
 from equalizer.identification.frequency_response.resonances import find_resonances
@@ -27,7 +27,6 @@ from study.store.disk.provenance import sha256_of
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
-from study.workflows.results.analyze_data import sensor_frame
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.collected import CollectedTrials
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study

@@ -55,9 +55,9 @@ LAYOUT = (
 """Contents of the file, as docs/formats.md lists them."""
 
 
-def read_identified_model(path: Path) -> IdentifiedModel:
+def read_identified_model(path: Path | str) -> IdentifiedModel:
     """Read a model. Raises CannotReadError, or UnusableFileError with all problems."""
-    problems = Problems()
+    path, problems = Path(path), Problems()
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         parts = _parts(file, problems)
     if problems.found:
@@ -69,12 +69,13 @@ def read_identified_model(path: Path) -> IdentifiedModel:
 
 
 def is_identified_model(path: Path) -> bool:
-    """Read a model of either kind, by the format attribute. Raises StudyError for a file without a known one."""
+    """True for an identified model, by its format and version; its contents are not read. Raises StudyError where the
+    file is none."""
     with open_hdf5(path, KIND, FORMAT, VERSION):
         return True
 
 
-def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: bool = False) -> None:
+def write_identified_model(path: Path | str, model: IdentifiedModel, *, overwrite: bool = False) -> None:
     """Write a model. Raises AlreadyThereError, CannotWriteError."""
 
     def fill(file: Any) -> None:
@@ -91,7 +92,7 @@ def write_identified_model(path: Path, model: IdentifiedModel, *, overwrite: boo
             _write_quality(file, model.quality)
         file.attrs["provenance"] = json.dumps(dict(model.provenance), allow_nan=False)
 
-    write_hdf5(path, fill, overwrite=overwrite)
+    write_hdf5(Path(path), fill, overwrite=overwrite)
 
 
 QUALITY = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")

@@ -41,14 +41,15 @@ LAYOUT = (
 """Keys of the file, as docs/formats.md lists them."""
 
 
-def read_mechanical_model(path: Path) -> MechanicalModel:
+def read_mechanical_model(path: Path | str) -> MechanicalModel:
     """Read a model. Raises CannotReadError, UnusableFileError."""
+    path = Path(path)
     try:
         return parse_mechanical_model(read_toml_text(path, KIND))
     except MechanicalModelError as error:
         raise UnusableFileError(path, KIND, error.problems) from error
 
 
-def write_mechanical_model(path: Path, model: MechanicalModel, *, overwrite: bool = False) -> None:
+def write_mechanical_model(path: Path | str, model: MechanicalModel, *, overwrite: bool = False) -> None:
     """Write a model. Raises AlreadyThereError, CannotWriteError."""
-    write_text(path, mechanical_model_toml(model), overwrite=overwrite)
+    write_text(Path(path), mechanical_model_toml(model), overwrite=overwrite)

@@ -36,8 +36,9 @@ _PACK_ABOVE_BYTES = 2**18
 """Arrays above this size are compressed; smaller ones are too small to gain by it."""
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path | str) -> Recording:
     """Read a recording in SI units. Raises CannotReadError, or UnusableFileError with all problems."""
+    path = Path(path)
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         problems = Problems()
         rate_hz = problems.attempt(lambda: _rate(file), 1.0)
@@ -65,7 +66,7 @@ def read_recording(path: Path) -> Recording:
 
 
 def write_recording(
-    path: Path,
+    path: Path | str,
     recording: Recording,
     *,
     precision: Literal["float32", "float64"] = "float64",
@@ -91,7 +92,7 @@ def write_recording(
         for key, value in recording.meta.items():
             meta.attrs[key] = json.dumps(value, allow_nan=False)
 
-    write_hdf5(path, fill, overwrite=overwrite)
+    write_hdf5(Path(path), fill, overwrite=overwrite)
 
 
 def _rate(file: Any) -> float:

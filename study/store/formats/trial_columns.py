@@ -9,8 +9,12 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "phase": ("Part of the session: training, test, detection, or catch trials within the test", ""),
     "frequency_hz": ("Frequency of the sinusoidal force", "Hz"),
     "level_n": ("Commanded amplitude of the force; the level of the staircase where nothing is roved", "N"),
-    "direction_shown": ("Which of the two directions was played: 1 or 2", ""),
-    "answer": ("Which direction was answered: 1 or 2; empty without an answer", ""),
+    "direction_shown": (
+        "Number on the screen, 1 or 2, of the direction that was played: the right answer. Where a protocol exchanges "
+        "the numbers for half of the people, angle_deg tells the direction; in detection it is the interval",
+        "",
+    ),
+    "answer": ("Number that was answered, 1 or 2, as in direction_shown; empty without an answer", ""),
     "correct": ("Whether the answer is right; empty without an answer", ""),
     "reversal": ("Whether the staircase turned at this trial", ""),
     "response_time_s": ("From the steady stimulus to the answer", "s"),

@@ -21,8 +21,9 @@ def write_trials(path: Path, trials: Iterable[Trial]) -> None:
     write_text(path, rows_to_csv(trials, Trial), overwrite=True)
 
 
-def read_trials(path: Path) -> tuple[Trial, ...]:
+def read_trials(path: Path | str) -> tuple[Trial, ...]:
     """Read the table. Raises CannotReadError, UnusableFileError."""
+    path = Path(path)
     try:
         trials = rows_from_csv(read_text(path), Trial)
     except CsvError as error:

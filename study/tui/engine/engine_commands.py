@@ -52,7 +52,7 @@ from study.tui.engine.to_engine import (
     Withdraw,
 )
 from study.workflows.results.fold_session import fold_session
-from study.workflows.results.session_results import write_results
+from study.workflows.results.write_results import write_results
 from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import ConductedSitting, Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting, finish_closed

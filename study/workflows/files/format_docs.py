@@ -256,9 +256,9 @@ _TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
     (
         "trials.csv",
         Trial,
-        "One row per presentation. Further columns may follow. `felt` is false where a person answered while no device "
-        "moved, and empty for simulated participants. In rows of the phase `catch` the level is the cap, and the "
-        "staircase does not move; in rows of the phase `detection`, `direction_shown` and `answer` are intervals.",
+        "One row per presentation; more columns may follow. `felt` is false where a person answered while no device "
+        "moved, empty for simulated ones. `direction_shown` and `answer` are numbers on the screen (`angle_deg` tells "
+        "the direction), in the phase `detection` intervals. In `catch` the level is the cap; no staircase moves.",
     ),
     (
         "thresholds.csv",

@@ -8,7 +8,7 @@ from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
 from study.devices.device import Device, Fault, Health
 from study.errors import DeviceError
-from study.session.stimulus.recording_plan import Piece, pieces
+from study.session.stimulus.recording_pieces import Piece, pieces
 
 LOWERED_TO = 0.7
 """Factor of the amplitude: 3 dB; after five repetitions a sixth is left."""

@@ -14,7 +14,7 @@ from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, UserInterruptError
 from study.session.stimulus.limits import limits_of_recording
-from study.session.stimulus.recording_plan import pieces
+from study.session.stimulus.recording_pieces import pieces
 from study.session.views.handle_notice import BeforeMoving, handle_notice, refuse_unannounced
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import write_recording

@@ -3,18 +3,14 @@
 import errno
 from pathlib import Path
 
-import numpy as np
-
 from analysis.figures.picture import Picture
 from analysis.figures.study_pictures import study_pictures
-from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids
+from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids, sensor_frame
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.declared_section import declared_words
 from analysis.reports.primary_tables import interval_words, limit_words
 from analysis.reports.study_report import render_study_report
-from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
 from study.errors import StudyError
 from study.local_clock import local_now
 from study.store.disk.file_errors import CannotWriteError
@@ -34,7 +30,7 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 
 
 def analyze_data(
-    data: Path, out: Path, ellipsoid: Path | None = None, protocol_name: str | None = None
+    data: Path | str, out: Path | str, ellipsoid: Path | str | None = None, protocol_name: str | None = None
 ) -> WrittenAnalysis:
     """Analyse all sessions in `data`; an earlier analysis in `out` is replaced. data: folder of sessions, a single
     session, or an exported dataset. ellipsoid: a recording for the report. protocol_name: whose sessions, where there
@@ -42,6 +38,7 @@ def analyze_data(
 
     Raises StudyError where there is nothing to analyse, where rows contradict their protocol, or on a full disk.
     """
+    data, out, ellipsoid = Path(data), Path(out), None if ellipsoid is None else Path(ellipsoid)
     collected = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
         analysis = analyse_study(collected.trials, collected.protocol, collected.left_out)
@@ -117,19 +114,6 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
             "Give a recording made with: hapteq record ellipsoid",
             saved="Nothing was written.",
         ) from problem
-
-
-def sensor_frame(recording: Recording) -> FloatArray | None:
-    """(3, 3): rotation from the sensor's axes to the device's, as the recording states it; None if it does not. Raises
-    ValueError for another shape."""
-    sensor = recording.meta.get("sensor")
-    frame = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
-    if frame is None:
-        return None
-    rotation = np.asarray(frame, dtype=np.float64)
-    if rotation.shape != (3, 3):
-        raise ValueError(f"the sensor's frame has the shape {rotation.shape}; it must be (3, 3)")
-    return rotation
 
 
 def _make_private(out: Path, data: Path) -> None:

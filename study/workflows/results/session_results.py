@@ -23,7 +23,6 @@ from study.store.sessions.session_lock import hold_session_lock
 from study.store.sessions.session_summary import SUMMARY_FORMAT, SUMMARY_NAME, SUMMARY_VERSION, read_summary
 from study.workflows.results.analysis_files import ANALYSIS_NAME
 from study.workflows.results.fold_session import FoldedSession, fold_session
-from study.workflows.results.written_analysis import WrittenAnalysis
 
 REPORT_NAME = f"{ANALYSIS_NAME}/report.html"
 """The last file that the analysis of a session writes."""
@@ -51,15 +50,6 @@ def write_tables(folder: SessionFolder) -> SessionState:
         write_thresholds(folder.path / name, rows)
     _write_summary(folder, state)
     return state
-
-
-def write_results(folder: SessionFolder) -> WrittenAnalysis:
-    """Write the tables and the analysis of this session alone."""
-    # Statistics and plots are slow to import; beginning or checking a session does not wait for them.
-    from study.workflows.results.analyze_data import analyze_data
-
-    write_tables(folder)
-    return analyze_data(folder.path, folder.path / ANALYSIS_NAME)
 
 
 def due_results(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:

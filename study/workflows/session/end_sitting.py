@@ -11,7 +11,8 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.analysis_files import ANALYSIS_NAME, is_analysis_of
 from study.workflows.results.fold_session import FoldedSession
-from study.workflows.results.session_results import REPORT_NAME, due_results, finish_tables, write_results, write_tables
+from study.workflows.results.session_results import REPORT_NAME, due_results, finish_tables, write_tables
+from study.workflows.results.write_results import write_results
 from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import ConductedSitting
 from study.workflows.session.prepare_sitting import does_not_take_part

@@ -15,11 +15,11 @@ from study.workflows.session.simulated_participant import make_simulated_partici
 
 def simulate_session(
     protocol: ProtocolFile[StudyProtocol],
-    data: Path,
+    data: Path | str,
     observer: str = "ideal",
     subject: str = "ideal1",
     seed: int = 1,
-    model: Path | None = None,
+    model: Path | str | None = None,
 ) -> SessionFolder:
     """Run it in virtual time, and write its log and its tables.
 
@@ -33,8 +33,8 @@ def simulate_session(
         subject=subject,
         observer=observer,
         seed=seed,
-        data=data,
-        model=model,
+        data=Path(data),
+        model=None if model is None else Path(model),
     )
     conducted = conduct_new(plan, "simulated", make_simulated_participant(observer, seed, VirtualClock()))
     write_tables(conducted.folder)

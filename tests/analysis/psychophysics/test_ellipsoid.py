@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.ellipsoid import direction_frame, ellipsoids, moment_ellipsoid, phasor_ellipse
+from analysis.psychophysics.ellipsoid import direction_frame, ellipsoids, moment_ellipsoid, phasor_ellipse, sensor_frame
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
@@ -163,6 +163,30 @@ def test_segments_without_a_description_are_refused(recording):
         ellipsoids(replace(recording, meta={}))
     with pytest.raises(ValueError, match=r"segment 1 \(sine\) lacks along, unit_vector"):
         ellipsoids(replace(recording, meta={"segments": [{"frequency_hz": 15.0}]}))
+
+
+def test_a_sensor_that_is_turned_is_turned_back():
+    quarter = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    played = recorded([tone([2.0, 0.0, 0.0], 15.0)], [15.0])
+    read = replace(played.response, samples=played.response.samples @ np.array(quarter))
+    turned = replace(played, response=read, meta={**played.meta, "sensor": {"frame_to_device": quarter}})
+    assert ellipsoids(turned, sensor_frame(turned))[0].phasor.tilt_deg == pytest.approx(0.0, abs=1e-6)
+    assert ellipsoids(turned)[0].phasor.tilt_deg > 40
+    assert sensor_frame(played) is None
+
+
+@pytest.mark.parametrize(
+    ("stated", "cause"),
+    [
+        ([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]], "no rotation"),
+        ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], r"shape \(2, 3\)"),
+        ({"x": 1.0}, "no matrix of numbers"),
+        ([[float("nan")] * 3] * 3, "no rotation"),
+    ],
+)
+def test_what_is_no_rotation_of_the_sensor_is_refused(recording, stated, cause):
+    with pytest.raises(ValueError, match=cause):
+        sensor_frame(replace(recording, meta={**recording.meta, "sensor": {"frame_to_device": stated}}))
 
 
 def test_a_recording_without_sinusoids_is_refused(recording):

@@ -33,6 +33,21 @@ def test_what_does_not_is_named_with_its_frequency(changes, said):
     assert "25 Hz" not in delivery_warning(found)
 
 
+def test_numbers_that_are_exchanged_between_people_hide_no_difference_between_the_directions():
+    strong = replace(TRIAL, angle_deg=135.0, delivered_mps2=3.9)
+    weak = replace(TRIAL, angle_deg=45.0, delivered_mps2=2.1)
+    found = deliveries(
+        [
+            replace(strong, direction_shown=1),
+            replace(weak, direction_shown=2),
+            replace(weak, subject="P02", direction_shown=1),
+            replace(strong, subject="P02", direction_shown=2),
+        ]
+    )
+    assert found[0].along == pytest.approx((1.3, 0.7))
+    assert "25 Hz (130 % and 70 % of what was wanted" in delivery_warning(found)
+
+
 def test_the_median_counts_and_void_trials_do_not():
     odd = replace(TRIAL, delivered_mps2=0.1)
     void = replace(TRIAL, delivered_mps2=0.2, status=TrialStatus.SPOILED)

@@ -7,8 +7,8 @@ import select
 
 import pytest
 
+from study.cli.motion_notice import announce
 from study.cli.progress import late_bar
-from study.cli.record import announce
 from study.errors import StudyError, WrongUseError
 from study.session.views.views import DeviceReport
 from study.workflows.checks import examine_setup

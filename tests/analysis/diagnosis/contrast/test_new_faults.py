@@ -96,7 +96,7 @@ def test_a_drive_that_follows_slowly_is_named(rig):
     ]
     left = [np.std(variant.undo[0](part[0]).command[:, 0] - given) for variant in fault.variants]
     best = fault.variants[int(np.argmin(left))]
-    assert best.values(np.ones(1))["rate"] == pytest.approx(40.0, rel=0.5)
+    assert best.parameters_of(np.ones(1))["rate"] == pytest.approx(40.0, rel=0.5)
     assert min(left) < 0.3 * np.std(asked - given)
 
 

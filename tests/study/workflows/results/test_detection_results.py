@@ -10,7 +10,7 @@ from study.store.formats.thresholds_file import read_thresholds
 from study.workflows.files.validate import validate_file
 from study.workflows.results.analysis_files import analysis_outputs
 from study.workflows.results.analyze_data import analyze_data
-from study.workflows.results.session_results import write_results
+from study.workflows.results.write_results import write_results
 
 BESIDE = """
 [practice]

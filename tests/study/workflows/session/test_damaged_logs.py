@@ -21,7 +21,8 @@ from study.store.sessions.log_seal import SEAL_NAME
 from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
-from study.workflows.results.session_results import due_results, write_results, write_tables
+from study.workflows.results.session_results import due_results, write_tables
+from study.workflows.results.write_results import write_results
 from study.workflows.session.end_sitting import finish_closed
 from study.workflows.session.participant_number import read_begun_participant
 from study.workflows.views.session_line import session_line

@@ -7,7 +7,7 @@ import pytest
 
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
-from study.workflows.results.session_results import write_results
+from study.workflows.results.write_results import write_results
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
 from study.workflows.views.session_line import session_line
 from study.workflows.views.view_session import session_view

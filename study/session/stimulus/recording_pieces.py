@@ -1,4 +1,11 @@
-"""Commands of a recording protocol: one piece per sinusoid, sweep or multisine, rests included."""
+"""The pieces of a recording: a protocol's segments as commands, one per sinusoid, sweep or multisine realisation.
+
+rest | fade in and settling | evaluated part | fade out | rest
+
+The evaluated part is the only one that an analysis uses: whole periods at constant amplitude (a sweep's first period
+contains its transient). Each piece is played by itself (`workflows/recording/play_pieces`), again with less force where
+the accelerometer clipped (`Piece.at`).
+"""
 
 from dataclasses import dataclass, replace
 
@@ -46,7 +53,8 @@ class Piece:
 
 
 def pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[Piece, ...]:
-    """All pieces of the protocol in the order of its segments, and the whole as often as the protocol repeats it."""
+    """All pieces in the order of the protocol's segments, the whole sequence as often as the protocol repeats it.
+    sample_rate_hz: of the device."""
     once: list[Piece] = []
     for number, segment in enumerate(protocol.segments, start=1):
         match segment:

@@ -7,7 +7,7 @@ from protocols.definition.apparatus import SafetySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import MultisineSegment, SineSegment, SweepSegment
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, limits_of_recording
-from study.session.stimulus.recording_plan import pieces
+from study.session.stimulus.recording_pieces import pieces
 
 RATE_HZ = 1000.0
 SAFETY = SafetySettings(stimulus_cap_n=2.0, total_cap_n=3.0)
