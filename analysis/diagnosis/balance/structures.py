@@ -37,7 +37,7 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.signal import FloatArray
 
 REFINED = (0.8, 0.93, 1.075, 1.25)
-"""Factors on a nonlinear parameter that one pass of a coordinate search tries."""
+"""Factors on a nonlinear parameter in one pass of a coordinate search."""
 ROUNDS = 6
 """Most passes of the search over the nonlinear parameters of a sum's laws."""
 
@@ -53,7 +53,6 @@ class Structure:
 
     @property
     def error(self) -> float:
-        """Cross-validated sum of squares over all folds."""
         return float(self.errors.sum())
 
 
@@ -62,7 +61,7 @@ class StructureSearch:
     """Result of the search for sums of laws."""
 
     regression: Regression
-    """With the refined laws of the final structures."""
+    """With refined laws."""
     linear: Structure
     best: Structure
     ranked: tuple[Structure, ...]

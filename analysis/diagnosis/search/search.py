@@ -17,10 +17,8 @@ Theory of operation.
    effect is looked for, as a law that alone explains is a shorter description than two effects, and at the end. A law
    that was found early and leaves a part is kept where the rest of the search names nothing.
 
-Reference recordings of the intact device are used in `reference/search_with_reference`, not here.
-
-Reference: Hastie, Tibshirani and Friedman, The Elements of Statistical Learning (2009), section 7.2 (training,
-validation and test samples) and 3.3 (stepwise selection).
+Reference recordings of the intact device: see `reference/search_with_reference`. Literature: Hastie, Tibshirani and
+Friedman, The Elements of Statistical Learning (2009), section 7.2 (training, validation, test), 3.3 (stepwise).
 """
 
 from collections.abc import Callable, Sequence
