@@ -15,7 +15,9 @@ from protocols.definition.staircase_rule import StaircaseRule
 UNSETTLED = "The search ended before it had settled: do not use these numbers."
 TUKEY = "{means} in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
 NO_MODEL = "The model needs answers of two participants, at two frequencies."
-NO_DIFFERENCE = "It needs two participants, with differences that are not all equal."
+NO_DIFFERENCE = (
+    "It needs two participants with enough answers at both frequencies, and differences that are not all equal."
+)
 NO_PAIR = "It needs thresholds at both frequencies, and a spread within frequencies."
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.psychophysics.group_contrasts import Contrast, contrasts, pair_contrast
 from analysis.psychophysics.hierarchy.answers import Answers
@@ -89,6 +90,7 @@ def primary_analysis(
     fit = fit_hierarchy(answers, family)
     pseudo, cap_db, frequencies = pseudo_thresholds(fit), to_db(cap_n), answers.frequencies_hz
     parameters, k, sds = fit.parameters, fit.layout.k, np.exp(fit.parameters[fit.layout.log_sds])
+    known = answers.played
     persons = estimate_persons(answers.subjects, np.hstack([fit.latent[:, :-2], fit.shared_means]), cap_db)
     return PrimaryAnalysis(
         family=family,
@@ -96,9 +98,9 @@ def primary_analysis(
         frequencies_hz=frequencies,
         confidence=confidence,
         medians=median_thresholds(fit, cap_db, confidence),
-        overall=repeated_measures(answers.subjects, pseudo.tolist()),
-        contrasts=contrasts(frequencies, pseudo, confidence),
-        limit=direction_limit(frequencies, pseudo, cap_db, confidence),
+        overall=_overall(answers, pseudo, family),
+        contrasts=contrasts(frequencies, pseudo, confidence, known),
+        limit=direction_limit(frequencies, pseudo, cap_db, confidence, known),
         persons=persons,
         runs=run_likelihoods(answers, _nuisances(fit, persons), cap_db, family, confidence),
         person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),
@@ -109,8 +111,36 @@ def primary_analysis(
         goodness=goodness_of_fit(fit),
         converged=fit.converged,
         missing_hz=tuple(frequency_hz for frequency_hz in asked_hz if frequency_hz not in frequencies),
-        declared_contrast=pair_contrast(frequencies, pseudo, declared_hz, confidence),
+        declared_contrast=pair_contrast(frequencies, pseudo, declared_hz, confidence, known),
     )  # fmt: skip
+
+
+def _overall(answers: Answers, pseudo: FloatArray, family: Family) -> RepeatedMeasures:
+    """Analysis of variance within participants. Of those without answers at some frequency a pseudo-threshold there
+    says nothing: they are left out, and the model is fitted to the others alone."""
+    whole = answers.played.all(axis=1)
+    values = np.full(pseudo.shape, np.nan)
+    if whole.all():
+        values = pseudo
+    elif whole.sum() > 1:
+        values[whole] = pseudo_thresholds(fit_hierarchy(answers_of(answers, whole), family))
+    return repeated_measures(answers.subjects, values.tolist())
+
+
+def answers_of(answers: Answers, chosen: NDArray[np.bool_]) -> Answers:
+    """Answers of some of the persons. chosen: (persons,)."""
+    k, cells = len(answers.frequencies_hz), chosen[answers.person]
+    subjects = tuple(subject for subject, kept in zip(answers.subjects, chosen, strict=True) if kept)
+    number = np.cumsum(chosen) - 1
+    return Answers(
+        subjects=subjects,
+        frequencies_hz=answers.frequencies_hz,
+        run=(number[answers.person] * k + answers.run % k)[cells],
+        level_db=answers.level_db[cells],
+        side=answers.side[cells],
+        right=answers.right[cells],
+        wrong=answers.wrong[cells],
+    )
 
 
 def _nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[Nuisance]:

@@ -93,9 +93,9 @@ def _primary_lines(analysis: StudyAnalysis) -> list[str]:
         return []
     lines = [f"{'frequency':>10}  {'median':>10}  {'95 % interval, all answers in one model':>10}"]
     for median in analysis.primary.medians:
-        size = f"{median.newton:.3f} N" if median.upper_n is not None else "above cap"
+        size = "above cap" if median.above_cap else f"{median.newton:.3f} N"
         unit = " N" if median.lower_n is not None else ""
-        end = interval_words(median.lower_n, median.upper_n, 3) + unit
+        end = interval_words(median.lower_n, median.upper_n, median.above_cap, 3) + unit
         lines.append(f"{median.frequency_hz:7g} Hz  {size:>10}  {end}")
     return [*lines, limit_words(analysis.primary), analysis.compared]
 

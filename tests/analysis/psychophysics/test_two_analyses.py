@@ -49,6 +49,14 @@ def test_a_missing_lower_bound_is_reported_on_the_page_and_in_the_terminal(analy
         assert "no lower bound" not in shown(analysis)
 
 
+def test_two_people_have_medians_without_an_interval_and_not_above_the_cap(protocol, simulate_study):
+    analysis = analyse_study(simulate_study(subjects=2, true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
+    page, lines = render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z"), "\n".join(text_table(analysis))
+    assert f"{analysis.primary.medians[0].newton:.3f} N  no interval: too few people" in lines
+    assert "above cap" not in lines
+    assert "no interval: too few people" in page and "no lower bound" not in page
+
+
 def test_each_interval_near_the_cap_carries_the_coverage_that_was_measured_for_it(analysis, protocol, simulate_study):
     page = render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z")
     for name in ("model", "means", "tobit", "tukey", "run", "one-way"):
