@@ -179,8 +179,9 @@ def _contrasts(
             for c in rows
         ),
         notes=(
-            f"Within participants, t with n − 1 degrees of freedom; n have enough answers at both. Equivalent: two one-sided "
-            f"tests within ±{EQUIVALENCE_DB:g} dB. Spread: Pitman and Morgan, whether people differ equally much at both.",
+            "Within participants, t with n − 1 degrees of freedom; n have enough answers at both. Equivalent: two "
+            f"one-sided tests within ±{EQUIVALENCE_DB:g} dB. Spread: Pitman and Morgan, whether people differ equally "
+            "much at both.",
             *(("* The median is above the cap: only the lower end of the interval is known.",) if above else ()),
             *notes,
         ),
