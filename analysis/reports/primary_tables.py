@@ -95,7 +95,16 @@ def _overall(primary: PrimaryAnalysis) -> str:
         f"bias {number(primary.criterion_sd)} (standard deviation, in units of d')."
         + ("" if primary.converged else " The search ended before it had settled: do not use these numbers.")
         + undetermined_words(primary)
+        + far_above_words(primary)
     )
+
+
+def far_above_words(primary: PrimaryAnalysis) -> str:
+    """A sentence with a space before it where frequencies cannot be compared with each other; else nothing."""
+    if len(primary.far_above_hz) < 2:
+        return ""
+    names = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])
+    return f" At {names} the medians lie at more than twice the cap: nothing is known of the differences between these."
 
 
 def undetermined_words(primary: PrimaryAnalysis) -> str:

@@ -25,6 +25,10 @@ from protocols.procedure.staircase import to_db
 
 CONFIDENCE = 0.95
 """Default confidence of all intervals."""
+FAR_ABOVE_DB = 6.0
+"""Of two medians that both lie this far above the cap no difference is told: the right answers are hardly more than
+chance at all levels, the sizes are extrapolated, and their differences have no known error."""
+FAR_ABOVE = "The medians lie at more than twice the cap: nothing is known of their differences."
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +75,8 @@ class PrimaryAnalysis:
     """Frequencies of the protocol without any answer: the model leaves them out."""
     declared_contrast: Contrast | None = None
     """Result for the protocol's declared pair; None where none is declared, or where it cannot be tested."""
+    far_above_hz: tuple[float, ...] = ()
+    """Frequencies whose medians lie `FAR_ABOVE_DB` above the cap; two of them have no contrast."""
 
 
 def primary_analysis(
@@ -90,7 +96,10 @@ def primary_analysis(
     fit = fit_hierarchy(answers, family)
     pseudo, cap_db, frequencies = pseudo_thresholds(fit), to_db(cap_n), answers.frequencies_hz
     parameters, k, sds = fit.parameters, fit.layout.k, np.exp(fit.parameters[fit.layout.log_sds])
-    known = answers.played
+    far = fit.means_db > cap_db + FAR_ABOVE_DB
+    far_hz = tuple(frequency for frequency, is_far in zip(frequencies, far, strict=True) if is_far)
+    # The first is the reference: from one far above the cap, another such has no difference.
+    told = np.flatnonzero(~(far & far[0]) | (np.arange(k) == 0))
     persons = estimate_persons(answers.subjects, np.hstack([fit.latent[:, :-2], fit.shared_means]), cap_db)
     return PrimaryAnalysis(
         family=family,
@@ -98,9 +107,11 @@ def primary_analysis(
         frequencies_hz=frequencies,
         confidence=confidence,
         medians=median_thresholds(fit, cap_db, confidence),
-        overall=_overall(answers, pseudo, family),
-        contrasts=contrasts(frequencies, pseudo, confidence, known),
-        limit=direction_limit(frequencies, pseudo, cap_db, confidence, known),
+        overall=_overall(answers, pseudo, family, far),
+        contrasts=contrasts(
+            tuple(frequencies[place] for place in told), pseudo[:, told], confidence, answers.played[:, told]
+        ),
+        limit=direction_limit(frequencies, pseudo, cap_db, confidence, answers.played),
         persons=persons,
         runs=run_likelihoods(answers, _nuisances(fit, persons), cap_db, family, confidence),
         person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),
@@ -111,13 +122,20 @@ def primary_analysis(
         goodness=goodness_of_fit(fit),
         converged=fit.converged,
         missing_hz=tuple(frequency_hz for frequency_hz in asked_hz if frequency_hz not in frequencies),
-        declared_contrast=pair_contrast(frequencies, pseudo, declared_hz, confidence, known),
+        declared_contrast=None
+        if set(declared_hz) <= set(far_hz)
+        else pair_contrast(frequencies, pseudo, declared_hz, confidence, answers.played),
+        far_above_hz=far_hz,
     )  # fmt: skip
 
 
-def _overall(answers: Answers, pseudo: FloatArray, family: Family) -> RepeatedMeasures:
-    """Analysis of variance within participants. Of those without answers at some frequency a pseudo-threshold there
-    says nothing: they are left out, and the model is fitted to the others alone."""
+def _overall(answers: Answers, pseudo: FloatArray, family: Family, far: NDArray[np.bool_]) -> RepeatedMeasures:
+    """Analysis of variance within participants; none where all medians lie far above the cap. Of those without answers
+    at some frequency a pseudo-threshold there says nothing: they are left out, and the model is fitted to the others
+    alone."""
+    if far.all():
+        empty = repeated_measures((), ())
+        return replace(empty, participants=answers.persons, conditions=len(far), notes=(FAR_ABOVE,))
     whole = answers.played.all(axis=1)
     values = np.full(pseudo.shape, np.nan)
     if whole.all():

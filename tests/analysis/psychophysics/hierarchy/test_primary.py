@@ -13,7 +13,7 @@ from analysis.psychophysics.hierarchy.inference import (
     median_thresholds,
     pseudo_thresholds,
 )
-from analysis.psychophysics.hierarchy.primary import primary_analysis
+from analysis.psychophysics.hierarchy.primary import FAR_ABOVE, primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED, simulated_run
 
@@ -89,6 +89,21 @@ def test_guessers_leave_everything_finite():
     assert found.converged
     assert np.isfinite([m.db for m in found.medians]).all()
     assert found.medians[1].above_cap
+
+
+def test_nothing_is_known_of_differences_between_frequencies_that_no_one_tells():
+    """Two medians of 30 dB above the cap have no difference: of guessers, half of such contrasts had p below 0.05."""
+    (study,) = studies(Crowd((5.0, 35.0, 45.0), (0.5, 1e4, 1e4)), 1, people=6)
+    found = primary_analysis(study.answers, 3.0, declared_hz=(45.0, 35.0))
+    assert found.far_above_hz == (35.0, 45.0)
+    assert found.declared_contrast is None
+    assert [c.frequency_hz for c in found.contrasts] == [35.0, 45.0]  # to 5 Hz, which is known
+    assert all(c.lower_db > 6.0 for c in found.contrasts)
+    (nothing,) = studies(Crowd((5.0, 45.0), (1e4, 1e4)), 1, people=6)
+    found = primary_analysis(nothing.answers, 3.0)
+    assert found.far_above_hz == (5.0, 45.0)
+    assert found.contrasts == () and found.overall.f is None and found.overall.p_huynh_feldt is None
+    assert found.overall.notes == (FAR_ABOVE,)
 
 
 def test_flat_thresholds_are_equal_and_equivalent():
