@@ -89,9 +89,9 @@ def contrasts(
     known = np.isfinite(values_db) if known is None else known
     found = []
     for place in range(1, len(frequencies_hz)):
-        both, having = values_db[:, [0, place]], known[:, [0, place]].all(axis=1)
+        both = values_db[:, [0, place]]
         whole = np.isfinite(both).all(axis=1)
-        both, having = both[whole], having[whole]
+        both, having = both[whole], np.asarray(known[whole][:, [0, place]].all(axis=1))
         if having.sum() >= 2 and np.ptp(both[:, 1] - both[:, 0]) > ROUNDING_DB:
             found.append((frequencies_hz[place], _Pair(both, having)))
     corrected = holm_correction([pair.p for _, pair in found])

@@ -174,18 +174,20 @@ def _is_above_chance(percent_correct: float, trials: int) -> bool:
 
 
 def _bias_warning(rows: Sequence[Threshold]) -> str:
-    leaning = [f"{_run_text(row)} (criterion {signed_number(row.criterion)})" for row in rows if _leans(row)]
+    leaning = [
+        f"{_run_text(row)} (criterion {signed_number(row.criterion)})"
+        for row in rows
+        if row.criterion is not None and _leans(row, row.criterion)
+    ]
     if not leaning:
         return ""
     return f"A bias towards one of the two answers, which raises a threshold, shows in {conjoin(leaning)}."
 
 
-def _leans(row: Threshold) -> bool:
+def _leans(row: Threshold, criterion: float) -> bool:
     """The variance is that of a run that showed both directions equally often."""
-    if row.criterion is None or row.percent_correct is None:
-        return False
-    half, right = row.trials / 2.0, round(row.trials * row.percent_correct / 100.0)
-    return abs(row.criterion) > max(STRONG_BIAS, BIAS_ERRORS * math.sqrt(criterion_variance(right, half, half)))
+    half, right = row.trials / 2.0, round(row.trials * (row.percent_correct or 0.0) / 100.0)
+    return abs(criterion) > max(STRONG_BIAS, BIAS_ERRORS * math.sqrt(criterion_variance(right, half, half)))
 
 
 def _drift_warning(trials: Iterable[Trial]) -> str:

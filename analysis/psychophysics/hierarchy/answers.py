@@ -52,7 +52,8 @@ class Answers:
         shape = self.persons, len(self.frequencies_hz)
         trials = np.bincount(self.run, weights=self.right + self.wrong, minlength=math.prod(shape))
         trials = trials.reshape(shape)
-        return trials >= np.clip(0.5 * trials.max(axis=0), 1.0, FEWEST_ANSWERS)
+        enough: NDArray[np.bool_] = trials >= np.clip(0.5 * trials.max(axis=0), 1.0, FEWEST_ANSWERS)
+        return enough
 
 
 def count_answers(trials: Iterable[Trial], frequencies_hz: Iterable[float]) -> Answers | None:

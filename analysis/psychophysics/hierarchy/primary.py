@@ -136,7 +136,7 @@ def _overall(answers: Answers, pseudo: FloatArray, family: Family, far: NDArray[
     if far.all():
         empty = repeated_measures((), ())
         return replace(empty, participants=answers.persons, conditions=len(far), notes=(FAR_ABOVE,))
-    whole = answers.played.all(axis=1)
+    whole: NDArray[np.bool_] = np.asarray(answers.played.all(axis=1))
     values = np.full(pseudo.shape, np.nan)
     if whole.all():
         values = pseudo
