@@ -94,24 +94,19 @@ def primary_analysis(
     if len(answers.frequencies_hz) < 2:
         return None
     fit = fit_hierarchy(answers, family)
-    pseudo, cap_db, frequencies = pseudo_thresholds(fit), to_db(cap_n), answers.frequencies_hz
+    cap_db, frequencies = to_db(cap_n), answers.frequencies_hz
     parameters, k, sds = fit.parameters, fit.layout.k, np.exp(fit.parameters[fit.layout.log_sds])
-    far = fit.means_db > cap_db + FAR_ABOVE_DB
-    far_hz = tuple(frequency for frequency, is_far in zip(frequencies, far, strict=True) if is_far)
-    # The first is the reference: from one far above the cap, another such has no difference.
-    told = np.flatnonzero(~(far & far[0]) | (np.arange(k) == 0))
     persons = estimate_persons(answers.subjects, np.hstack([fit.latent[:, :-2], fit.shared_means]), cap_db)
+    compared = _compare(fit, cap_db, confidence, declared_hz)
     return PrimaryAnalysis(
         family=family,
         trials=answers.trials,
         frequencies_hz=frequencies,
         confidence=confidence,
         medians=median_thresholds(fit, cap_db, confidence),
-        overall=_overall(answers, pseudo, family, far),
-        contrasts=contrasts(
-            tuple(frequencies[place] for place in told), pseudo[:, told], confidence, answers.played[:, told]
-        ),
-        limit=direction_limit(frequencies, pseudo, cap_db, confidence, answers.played),
+        overall=compared.overall,
+        contrasts=compared.contrasts,
+        limit=direction_limit(frequencies, pseudo_thresholds(fit), cap_db, confidence, answers.played),
         persons=persons,
         runs=run_likelihoods(answers, _nuisances(fit, persons), cap_db, family, confidence),
         person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),
@@ -122,11 +117,37 @@ def primary_analysis(
         goodness=goodness_of_fit(fit),
         converged=fit.converged,
         missing_hz=tuple(frequency_hz for frequency_hz in asked_hz if frequency_hz not in frequencies),
-        declared_contrast=None
-        if set(declared_hz) <= set(far_hz)
-        else pair_contrast(frequencies, pseudo, declared_hz, confidence, answers.played),
-        far_above_hz=far_hz,
+        declared_contrast=compared.declared,
+        far_above_hz=compared.far_above_hz,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Compared:
+    """Differences between frequencies."""
+
+    overall: RepeatedMeasures
+    contrasts: tuple[Contrast, ...]
+    declared: Contrast | None
+    far_above_hz: tuple[float, ...]
+
+
+def _compare(fit: HierarchicalFit, cap_db: float, confidence: float, declared_hz: Sequence[float]) -> _Compared:
+    frequencies, played, pseudo = fit.answers.frequencies_hz, fit.answers.played, pseudo_thresholds(fit)
+    far = fit.means_db > cap_db + FAR_ABOVE_DB
+    far_hz = tuple(frequency_hz for frequency_hz, is_far in zip(frequencies, far, strict=True) if is_far)
+    # The first is the reference: from one far above the cap, another such has no difference.
+    told = np.flatnonzero(~(far & far[0]) | (np.arange(len(far)) == 0))
+    hz = tuple(frequencies[place] for place in told)
+    declared = None
+    if not set(declared_hz) <= set(far_hz):
+        declared = pair_contrast(frequencies, pseudo, declared_hz, confidence, played)
+    return _Compared(
+        overall=_overall(fit.answers, pseudo, fit.family, far),
+        contrasts=contrasts(hz, pseudo[:, told], confidence, played[:, told]),
+        declared=declared,
+        far_above_hz=far_hz,
+    )
 
 
 def _overall(answers: Answers, pseudo: FloatArray, family: Family, far: NDArray[np.bool_]) -> RepeatedMeasures:
