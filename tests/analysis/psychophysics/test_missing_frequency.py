@@ -17,6 +17,7 @@ from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.trial import TrialStatus
 from tests.analysis.conftest import PUBLISHED
+from tests.references.coverage_outside_the_model import with_few
 
 PLAYED = (5.0, 25.0, 45.0)
 LOW = (0.2, 0.2, 0.3, 0.5, 0.8)
@@ -73,30 +74,13 @@ def test_a_declared_contrast_with_a_missing_frequency_is_not_known(trials, proto
     assert by_model.notes == ("There is no answer at 35 Hz yet.",)
 
 
-def first_answers(answers, people, count):
-    """The last frequency as played by some people, and up to `count` answers of the others there, strongest first."""
-    k, right, wrong = len(answers.frequencies_hz), answers.right.copy(), answers.wrong.copy()
-    for person in range(people, answers.persons):
-        cells = np.flatnonzero(answers.run == person * k + k - 1)
-        left = count
-        for cell in cells[np.argsort(-answers.level_db[cells], kind="stable")]:
-            for given in (right, wrong):
-                given[cell] = min(left, given[cell])
-                left -= given[cell]
-    kept = right + wrong > 0
-    return replace(
-        answers, run=answers.run[kept], level_db=answers.level_db[kept], side=answers.side[kept],
-        right=right[kept], wrong=wrong[kept],
-    )  # fmt: skip
-
-
 STUDY = simulate_crowd(Crowd((5.0, 25.0, 45.0), (0.4, 0.7, 1.0)), PUBLISHED, 10, (19, 1)).answers
 
 
 @pytest.mark.parametrize("count", [0, 8])
 def test_what_a_single_person_played_has_no_interval(count):
     """The estimate follows the one who played, whose spread is not known: it held the truth in half of the studies."""
-    found = primary_analysis(first_answers(STUDY, 1, count), 3.0, declared_hz=(45.0, 5.0))
+    found = primary_analysis(with_few(STUDY, 1, count), 3.0, declared_hz=(45.0, 5.0))
     assert [c.frequency_hz for c in found.contrasts] == [25.0]
     assert found.declared_contrast is None
     assert found.medians[2].lower_db is None and found.medians[2].upper_db is None
@@ -105,7 +89,7 @@ def test_what_a_single_person_played_has_no_interval(count):
 
 
 def test_few_people_at_a_frequency_count_as_few():
-    few, all_of_them = primary_analysis(first_answers(STUDY, 3, 0), 3.0), primary_analysis(STUDY, 3.0)
+    few, all_of_them = primary_analysis(with_few(STUDY, 3, 0), 3.0), primary_analysis(STUDY, 3.0)
     assert [c.participants for c in few.contrasts] == [10, 3]
     assert few.contrasts[1].effect_size is None and few.contrasts[1].p_spread is None
     widths = [found.medians[2].upper_db - found.medians[2].lower_db for found in (few, all_of_them)]
@@ -120,7 +104,7 @@ def test_few_people_at_a_frequency_count_as_few():
 
 def test_short_runs_of_all_are_not_few():
     """A protocol of short runs: all have as many answers as anyone."""
-    short = first_answers(STUDY, 0, 12)
+    short = with_few(STUDY, 0, 12)
     assert short.played.all()
 
 
@@ -148,6 +132,6 @@ def test_intervals_hold_where_few_of_the_people_played_a_frequency():
     held = 0
     for seed in range(40):
         answers = simulate_crowd(crowd, PUBLISHED, 10, (19, 2, seed)).answers
-        (found,) = primary_analysis(first_answers(answers, 2, 8), 3.0).contrasts[1:]
+        (found,) = primary_analysis(with_few(answers, 2, 8), 3.0).contrasts[1:]
         held += found.lower_db <= true_db <= found.upper_db
     assert held >= 36
