@@ -23,7 +23,9 @@ from analysis.psychophysics.hierarchy.primary import PersonEstimate, PrimaryAnal
 _SPREAD = 0.5
 """Width taken by the people at one frequency, in steps between frequencies."""
 _ABOVE, _TOP = 1.12, 1.45
-"""Of the cap: the line of those above it, and the end of the axis."""
+"""Of the cap: the line of those above it, and the least end of the axis."""
+_HIGHEST, _ARROW = 8.0, 1.25
+"""Of the cap: the highest end of the axis. Of its lower end: the least length of a bound's arrow."""
 _LEGEND_LIMIT = 24
 """Most people for whom there is a legend."""
 
@@ -35,7 +37,7 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     axes = figure.add_subplot()
     plain_axes(axes)
     axes.set_yscale("log")
-    top, lowest = _TOP * cap_n, _lowest(primary)
+    top, lowest = _top(primary, cap_n), _lowest(primary)
     axes.set_ylim(lowest, top)
     ratio_ticks(axes.yaxis, lowest, cap_n)
     axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)
@@ -51,6 +53,13 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     axes.set_ylabel("Threshold (N)")
     figure.legend(handles=_legend(primary, cap_n), loc="outside right upper", fontsize=8.5, frameon=False)
     return figure
+
+
+def _top(primary: PrimaryAnalysis, cap_n: float) -> float:
+    """End of the axis: intervals and bounds are inside, unless they lie so far above the cap that nothing else would be
+    readable."""
+    ends = [median.upper_n or _ARROW * (median.lower_n or 0.0) for median in primary.medians]
+    return min(max(_TOP * cap_n, *(1.1 * end for end in ends)), _HIGHEST * cap_n)
 
 
 def _lowest(primary: PrimaryAnalysis) -> float:
@@ -71,7 +80,7 @@ def _draw_person(axes: Axes, person: PersonEstimate, number: int, shift: float, 
 def _draw_median(axes: Axes, place: int, median: MedianThreshold, ends: tuple[float, float]) -> None:
     """ends: of the axis."""
     if median.above_cap:
-        begin = ends[0] if median.lower_n is None else median.lower_n
+        begin = ends[0] if median.lower_n is None else min(median.lower_n, ends[1] / _ARROW)
         axes.annotate("", (place, ends[1]), xytext=(place, begin), zorder=4,
                       arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.6, "shrinkA": 0,
                                   "shrinkB": 0})  # fmt: skip

@@ -97,16 +97,17 @@ def primary_analysis(
     cap_db, frequencies = to_db(cap_n), answers.frequencies_hz
     parameters, k, sds = fit.parameters, fit.layout.k, np.exp(fit.parameters[fit.layout.log_sds])
     persons = estimate_persons(answers.subjects, np.hstack([fit.latent[:, :-2], fit.shared_means]), cap_db)
-    compared = _compare(fit, cap_db, confidence, declared_hz)
+    medians, compared = median_thresholds(fit, cap_db, confidence), _compare(fit, cap_db, confidence, declared_hz)
+    above = [m.frequency_hz for m in medians if m.above_cap and m.lower_db is not None and m.lower_db > cap_db]
     return PrimaryAnalysis(
         family=family,
         trials=answers.trials,
         frequencies_hz=frequencies,
         confidence=confidence,
-        medians=median_thresholds(fit, cap_db, confidence),
+        medians=medians,
         overall=compared.overall,
         contrasts=compared.contrasts,
-        limit=direction_limit(frequencies, pseudo_thresholds(fit), cap_db, confidence, answers.played),
+        limit=direction_limit(frequencies, pseudo_thresholds(fit), cap_db, confidence, answers.played, above),
         persons=persons,
         runs=run_likelihoods(answers, _nuisances(fit, persons), cap_db, family, confidence),
         person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),

@@ -154,6 +154,18 @@ def test_a_median_that_falls_below_the_cap_again_is_told_beside_the_limit():
     assert "again" not in direction_limit(HZ, rising, 10.0, 0.95).words
 
 
+def test_the_limit_is_below_a_frequency_whose_median_is_shown_to_be_above_the_cap():
+    """Far above the cap the influence functions are as wide as the extrapolation: 14 ± 4.5 dB at 45 Hz."""
+    rng = np.random.default_rng(4)
+    pseudo = np.array([-8.0, -4.0, 0.0, 8.0, 14.0]) + np.array([0.3, 0.3, 0.3, 0.3, 8.0]) * rng.standard_normal((10, 5))
+    assert direction_limit(HZ, pseudo, 10.0, 0.95).upper_hz is None
+    found = direction_limit(HZ, pseudo, 10.0, 0.95, shown_above=(45.0,))
+    assert 40.0 < found.upper_hz < 45.0
+    (study,) = studies(Crowd((5.0, 25.0, 45.0), (0.3, 0.5, 8.0)), 1)
+    analysis = primary_analysis(study.answers, 3.0)
+    assert analysis.medians[2].lower_n > 3.0 and analysis.limit.upper_hz < 45.0
+
+
 def test_an_interval_narrower_than_the_grid_still_holds_the_limit():
     pseudo = np.array([-8.0, -4.0, 0.0, 8.0, 12.0]) + 1e-9 * np.arange(10)[:, None]
     found = direction_limit(HZ, pseudo, 10.0, 0.95)
