@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from analysis.figures.style import (
     BLACK,
@@ -42,8 +43,10 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     ratio_ticks(axes.yaxis, lowest, cap_n)
     axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)
     places = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(primary.persons))
+    played = {(run.subject, run.frequency_hz) for run in primary.runs}
     for number, person in enumerate(primary.persons):
-        _draw_person(axes, person, number, places[number], cap_n)
+        known = np.array([(person.subject, frequency_hz) in played for frequency_hz in primary.frequencies_hz])
+        _draw_person(axes, person, (number, places[number]), known, cap_n)
     for place, median in enumerate(primary.medians):
         _draw_median(axes, place, median, (lowest, top))
     _draw_limit(axes, primary.limit, primary.frequencies_hz, cap_n)
@@ -67,14 +70,18 @@ def _lowest(primary: PrimaryAnalysis) -> float:
     return 0.85 * min(*people, *(median.lower_n or median.newton for median in primary.medians))
 
 
-def _draw_person(axes: Axes, person: PersonEstimate, number: int, shift: float, cap_n: float) -> None:
-    shown = [
-        _ABOVE * cap_n if above else value for value, above in zip(person.thresholds_n, person.above_cap, strict=True)
-    ]
-    at = np.arange(len(shown)) + shift
+def _draw_person(
+    axes: Axes, person: PersonEstimate, place: tuple[int, float], known: NDArray[np.bool_], cap_n: float
+) -> None:
+    """place: number, and shift on the axis. known: (k,), where the person has answers: what the model expects elsewhere
+    is not drawn."""
+    number, shift = place
+    above_cap = np.array(person.above_cap)
+    shown = np.where(above_cap, _ABOVE * cap_n, person.thresholds_n)[known]
+    at = (np.arange(len(known)) + shift)[known]
     axes.plot(at, shown, "-", color=participant_colour(number), linewidth=0.7, alpha=0.45, zorder=1)
-    for x, value, above in zip(at, shown, person.above_cap, strict=True):
-        draw_threshold(axes, float(x), value, number, above)
+    for x, value, above in zip(at, shown, above_cap[known], strict=True):
+        draw_threshold(axes, float(x), float(value), number, bool(above))
 
 
 def _draw_median(axes: Axes, place: int, median: MedianThreshold, ends: tuple[float, float]) -> None:

@@ -55,6 +55,15 @@ def test_people_keep_their_markers_and_stand_hollow_above_the_cap(primary):
     assert axes.get_ylim()[1] > 1.12 * CAP_N
 
 
+def test_a_person_is_drawn_at_the_frequencies_with_answers_alone(primary):
+    gone = (primary.persons[2].subject, 25.0)
+    runs = tuple(run for run in primary.runs if (run.subject, run.frequency_hz) != gone)
+    assert len(runs) == len(primary.runs) - 1
+    axes = draw_medians(replace(primary, runs=runs), CAP_N).axes[0]
+    third = [line for line in axes.lines if line.get_marker() == MARKERS[2] and line.get_markersize() == 6]
+    assert [round(float(line.get_xdata()[0])) for line in third] == [0, 2]
+
+
 def test_the_direction_limit_lies_on_the_cap_between_its_frequencies(primary):
     axes = draw_medians(primary, CAP_N).axes[0]
     (mark,) = [line for line in axes.lines if line.get_marker() == "D" and line.get_markersize() == 8]
