@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from analysis.figures.style import (
     BLACK,
@@ -23,7 +24,9 @@ from analysis.psychophysics.hierarchy.primary import PersonEstimate, PrimaryAnal
 _SPREAD = 0.5
 """Width taken by the people at one frequency, in steps between frequencies."""
 _ABOVE, _TOP = 1.12, 1.45
-"""Of the cap: the line of those above it, and the end of the axis."""
+"""Of the cap: the line of those above it, and the least end of the axis."""
+_HIGHEST, _ARROW = 8.0, 1.25
+"""Of the cap: the highest end of the axis. Of its lower end: the least length of a bound's arrow."""
 _LEGEND_LIMIT = 24
 """Most people for whom there is a legend."""
 
@@ -35,13 +38,15 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     axes = figure.add_subplot()
     plain_axes(axes)
     axes.set_yscale("log")
-    top, lowest = _TOP * cap_n, _lowest(primary)
+    top, lowest = _top(primary, cap_n), _lowest(primary)
     axes.set_ylim(lowest, top)
     ratio_ticks(axes.yaxis, lowest, cap_n)
     axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)
     places = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(primary.persons))
+    played = {(run.subject, run.frequency_hz) for run in primary.runs}
     for number, person in enumerate(primary.persons):
-        _draw_person(axes, person, number, places[number], cap_n)
+        known = np.array([(person.subject, frequency_hz) in played for frequency_hz in primary.frequencies_hz])
+        _draw_person(axes, person, (number, places[number]), known, cap_n)
     for place, median in enumerate(primary.medians):
         _draw_median(axes, place, median, (lowest, top))
     _draw_limit(axes, primary.limit, primary.frequencies_hz, cap_n)
@@ -53,25 +58,36 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     return figure
 
 
+def _top(primary: PrimaryAnalysis, cap_n: float) -> float:
+    """End of the axis: intervals and bounds are inside, unless they lie so far above the cap that nothing else would be
+    readable."""
+    ends = [median.upper_n or _ARROW * (median.lower_n or 0.0) for median in primary.medians]
+    return min(max(_TOP * cap_n, *(1.1 * end for end in ends)), _HIGHEST * cap_n)
+
+
 def _lowest(primary: PrimaryAnalysis) -> float:
     people = [value for person in primary.persons for value in person.thresholds_n]
     return 0.85 * min(*people, *(median.lower_n or median.newton for median in primary.medians))
 
 
-def _draw_person(axes: Axes, person: PersonEstimate, number: int, shift: float, cap_n: float) -> None:
-    shown = [
-        _ABOVE * cap_n if above else value for value, above in zip(person.thresholds_n, person.above_cap, strict=True)
-    ]
-    at = np.arange(len(shown)) + shift
+def _draw_person(
+    axes: Axes, person: PersonEstimate, place: tuple[int, float], known: NDArray[np.bool_], cap_n: float
+) -> None:
+    """place: number, and shift on the axis. known: (k,), where the person has answers: what the model expects elsewhere
+    is not drawn."""
+    number, shift = place
+    above_cap = np.array(person.above_cap)
+    shown = np.where(above_cap, _ABOVE * cap_n, person.thresholds_n)[known]
+    at = (np.arange(len(known)) + shift)[known]
     axes.plot(at, shown, "-", color=participant_colour(number), linewidth=0.7, alpha=0.45, zorder=1)
-    for x, value, above in zip(at, shown, person.above_cap, strict=True):
-        draw_threshold(axes, float(x), value, number, above)
+    for x, value, above in zip(at, shown, above_cap[known], strict=True):
+        draw_threshold(axes, float(x), float(value), number, bool(above))
 
 
 def _draw_median(axes: Axes, place: int, median: MedianThreshold, ends: tuple[float, float]) -> None:
     """ends: of the axis."""
     if median.above_cap:
-        begin = ends[0] if median.lower_n is None else median.lower_n
+        begin = ends[0] if median.lower_n is None else min(median.lower_n, ends[1] / _ARROW)
         axes.annotate("", (place, ends[1]), xytext=(place, begin), zorder=4,
                       arrowprops={"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.6, "shrinkA": 0,
                                   "shrinkB": 0})  # fmt: skip

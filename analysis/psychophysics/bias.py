@@ -41,6 +41,14 @@ def response_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> R
     return ResponseBias(d_prime=z_hit - z_false_alarm, criterion=-0.5 * (z_hit + z_false_alarm))
 
 
+def criterion_variance(right: int, first: float, second: float) -> float:
+    """Variance of c by chance, that of two z scores at the share of right answers over both directions. right: correct
+    answers; first, second: trials of each direction, above 0."""
+    rate = (right + 0.5) / (first + second + 1.0)
+    by_answer = rate * (1.0 - rate) / NormalDist().pdf(NormalDist().inv_cdf(rate)) ** 2
+    return by_answer * (1.0 / first + 1.0 / second) / 4.0
+
+
 def _corrected_z(answers: Sequence[bool]) -> float:
     """z of the rate with half an answer added to either side, which keeps rates of 0 and 1 finite."""
     return NormalDist().inv_cdf((sum(answers) + 0.5) / (len(answers) + 1.0))

@@ -15,7 +15,7 @@ from statistics import NormalDist
 
 from scipy.stats import t as student
 
-from analysis.psychophysics.bias import response_bias
+from analysis.psychophysics.bias import criterion_variance, response_bias
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,5 @@ def _p(z: float, dispersion: float, freedom: int) -> float:
 def _criterion_variance(directions_shown: Sequence[int], correct: Sequence[bool]) -> float:
     """Of two z scores at the run's share of right answers, as without a bias: at the rates of the run itself, runs of a
     strong bias would count for little."""
-    rate = (sum(correct) + 0.5) / (len(correct) + 1.0)
-    by_answer = rate * (1.0 - rate) / NormalDist().pdf(NormalDist().inv_cdf(rate)) ** 2
     first = sum(shown == 1 for shown in directions_shown)
-    return by_answer * (1.0 / first + 1.0 / (len(directions_shown) - first)) / 4.0
+    return criterion_variance(sum(correct), first, len(directions_shown) - first)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from analysis.psychophysics.comparisons import Comparisons
-from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
+from analysis.psychophysics.hierarchy.primary import FAR_ABOVE, PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
 from analysis.threshold_words import capitalised, threshold_words
 from analysis.wording import conjoin
@@ -15,7 +15,9 @@ from protocols.definition.staircase_rule import StaircaseRule
 UNSETTLED = "The search ended before it had settled: do not use these numbers."
 TUKEY = "{means} in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
 NO_MODEL = "The model needs answers of two participants, at two frequencies."
-NO_DIFFERENCE = "It needs two participants, with differences that are not all equal."
+NO_DIFFERENCE = (
+    "It needs two participants with enough answers at both frequencies, and differences that are not all equal."
+)
 NO_PAIR = "It needs thresholds at both frequencies, and a spread within frequencies."
 
 
@@ -115,6 +117,8 @@ def _by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, dec
 
 
 def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
+    if set(pair_hz) <= set(primary.far_above_hz):
+        return FAR_ABOVE
     missing = [f"{frequency_hz:g} Hz" for frequency_hz in pair_hz if frequency_hz in primary.missing_hz]
     return f"There is no answer at {conjoin(missing)} yet." if missing else NO_DIFFERENCE
 

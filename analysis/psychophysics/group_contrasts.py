@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import pearsonr
 from scipy.stats import t as student
 
@@ -46,27 +47,68 @@ class Contrast:
     """Pitman and Morgan: whether people differ equally much at both frequencies. None below three participants."""
 
 
-def contrasts(frequencies_hz: Sequence[float], values_db: FloatArray, confidence: float) -> tuple[Contrast, ...]:
+@dataclass(frozen=True, slots=True, eq=False)
+class MeanErrors:
+    """Standard errors of means over people, (m,) each."""
+
+    people: NDArray[np.intp]
+    """Those with answers of their own."""
+    error: FloatArray
+    """Infinite below two of them."""
+    df: FloatArray
+    """Degrees of freedom for Student's t."""
+
+
+def mean_errors(values: FloatArray, known: NDArray[np.bool_]) -> MeanErrors:
+    """Errors of the means of pseudo-values. values: (n, m), one from each person; known: (n, m), whether it rests on
+    answers of their own there, or only on what theirs at other frequencies tell.
+
+    Where all are known this is the textbook's error, with n - 1 degrees of freedom. Else both groups of people add
+    their part, each with its own degrees of freedom (F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110-114): the
+    estimate follows the few who have answers, so that their number counts and not that of all.
+    """
+    n = len(values)
+    people = known.sum(axis=0)
+    squares = ((values - values.mean(axis=0)) / n) ** 2
+    known_df = np.maximum(people - 1, 1)
+    inside = np.sum(squares * known, axis=0) * people / known_df
+    outside, others = np.sum(squares * ~known, axis=0), np.maximum(n - people, 1)
+    error, df = np.sqrt(inside + outside), (inside + outside) ** 2 / (inside**2 / known_df + outside**2 / others)
+    error = np.where(people == n, values.std(axis=0, ddof=1) / math.sqrt(n), error)
+    return MeanErrors(people, np.where(people < 2, math.inf, error), np.where(people == n, n - 1.0, df))
+
+
+def contrasts(
+    frequencies_hz: Sequence[float],
+    values_db: FloatArray,
+    confidence: float,
+    known: NDArray[np.bool_] | None = None,
+) -> tuple[Contrast, ...]:
     """values_db: (n, k), NaN for a gap. Contrasts without two participants, or with differences equal in all, are
-    left out."""
+    left out. known: (n, k), of pseudo-values, which have no gaps; see `mean_errors`."""
+    known = np.isfinite(values_db) if known is None else known
     found = []
     for place in range(1, len(frequencies_hz)):
         both = values_db[:, [0, place]]
-        both = both[np.isfinite(both).all(axis=1)]
-        if len(both) >= 2 and np.ptp(both[:, 1] - both[:, 0]) > ROUNDING_DB:
-            found.append((frequencies_hz[place], both))
-    p_values = [_t_test(both[:, 1] - both[:, 0]) for _, both in found]
-    corrected = holm_correction(p_values)
+        whole = np.isfinite(both).all(axis=1)
+        both, having = both[whole], np.asarray(known[whole][:, [0, place]].all(axis=1))
+        if having.sum() >= 2 and np.ptp(both[:, 1] - both[:, 0]) > ROUNDING_DB:
+            found.append((frequencies_hz[place], _Pair(both, having)))
+    corrected = holm_correction([pair.p for _, pair in found])
     return tuple(
-        _compute_contrast(frequency, frequencies_hz[0], both, p, p_holm, confidence)
-        for (frequency, both), p, p_holm in zip(found, p_values, corrected, strict=True)
+        _compute_contrast(frequency, frequencies_hz[0], pair, p_holm, confidence)
+        for (frequency, pair), p_holm in zip(found, corrected, strict=True)
     )
 
 
 def pair_contrast(
-    frequencies_hz: Sequence[float], values_db: FloatArray, pair_hz: Sequence[float], confidence: float
+    frequencies_hz: Sequence[float],
+    values_db: FloatArray,
+    pair_hz: Sequence[float],
+    confidence: float,
+    known: NDArray[np.bool_] | None = None,
 ) -> Contrast | None:
-    """The first frequency of the pair minus the second. values_db: (n, k), NaN for a gap.
+    """The first frequency of the pair minus the second. values_db, known: (n, k), as `contrasts` takes them.
 
     None without a pair, where one of the two was not played, and where `contrasts` leaves it out. A family of its own:
     Holm's p is the plain one.
@@ -74,7 +116,9 @@ def pair_contrast(
     if len(pair_hz) != 2 or not set(pair_hz) <= set(frequencies_hz):
         return None
     first, second = (list(frequencies_hz).index(frequency_hz) for frequency_hz in pair_hz)
-    return next(iter(contrasts((pair_hz[1], pair_hz[0]), values_db[:, [second, first]], confidence)), None)
+    places = [second, first]
+    having = None if known is None else known[:, places]
+    return next(iter(contrasts((pair_hz[1], pair_hz[0]), values_db[:, places], confidence, having)), None)
 
 
 def holm_correction(p_values: Sequence[float]) -> tuple[float, ...]:
@@ -86,35 +130,46 @@ def holm_correction(p_values: Sequence[float]) -> tuple[float, ...]:
     return tuple(corrected)
 
 
+class _Pair:
+    """Values (n, 2) at two frequencies, and how well their mean difference is known. having: (n,), as `mean_errors`
+    takes it."""
+
+    def __init__(self, both: FloatArray, having: NDArray[np.bool_]) -> None:
+        self.both, self.differences = both, both[:, 1] - both[:, 0]
+        errors = mean_errors(self.differences[:, None], having[:, None])
+        self.people, self.whole = int(errors.people[0]), bool(having.all())
+        self.mean, self.error, self.df = float(self.differences.mean()), float(errors.error[0]), float(errors.df[0])
+        self.p = float(2.0 * student.sf(abs(self.mean) / self.error, self.df))
+
+
 def _compute_contrast(
-    frequency_hz: float, against_hz: float, both: FloatArray, p: float, p_holm: float, confidence: float
+    frequency_hz: float, against_hz: float, pair: _Pair, p_holm: float, confidence: float
 ) -> Contrast:
-    differences, n = both[:, 1] - both[:, 0], len(both)
-    mean, sd = float(differences.mean()), float(differences.std(ddof=1))
-    half = float(student.ppf(0.5 + confidence / 2, n - 1)) * sd / math.sqrt(n)
+    half = float(student.ppf(0.5 + confidence / 2, pair.df)) * pair.error
+    equivalence = _equivalence_p(pair.mean, pair.error, pair.df)
     return Contrast(
         frequency_hz=frequency_hz,
         against_hz=against_hz,
-        participants=n,
-        difference_db=mean,
-        lower_db=mean - half,
-        upper_db=mean + half,
-        p=p,
+        participants=pair.people,
+        difference_db=pair.mean,
+        lower_db=pair.mean - half,
+        upper_db=pair.mean + half,
+        p=pair.p,
         p_holm=p_holm,
-        effect_size=mean / sd,
-        p_equivalence=equivalence_p(differences) if max(frequency_hz, against_hz) <= EQUIVALENCE_UP_TO_HZ else None,
-        p_spread=float(pearsonr(both.sum(axis=1), differences).pvalue) if n > 2 else None,
+        effect_size=pair.mean / float(pair.differences.std(ddof=1)) if pair.whole else None,
+        p_equivalence=equivalence if max(frequency_hz, against_hz) <= EQUIVALENCE_UP_TO_HZ else None,
+        p_spread=float(pearsonr(pair.both.sum(axis=1), pair.differences).pvalue)
+        if pair.whole and pair.people > 2
+        else None,
     )
-
-
-def _t_test(differences: FloatArray) -> float:
-    n = len(differences)
-    return float(2.0 * student.sf(abs(differences.mean()) / (differences.std(ddof=1) / math.sqrt(n)), n - 1))
 
 
 def equivalence_p(differences_db: FloatArray, margin_db: float = EQUIVALENCE_DB) -> float:
     """The larger p of two one-sided tests: small where the mean difference is shown to lie within the margin."""
     n = len(differences_db)
-    error = differences_db.std(ddof=1) / math.sqrt(n)
-    inside = margin_db - abs(differences_db.mean())
-    return float(student.sf(inside / error, n - 1))
+    error = float(differences_db.std(ddof=1)) / math.sqrt(n)
+    return _equivalence_p(float(differences_db.mean()), error, n - 1, margin_db)
+
+
+def _equivalence_p(mean_db: float, error_db: float, df: float, margin_db: float = EQUIVALENCE_DB) -> float:
+    return float(student.sf((margin_db - abs(mean_db)) / error_db, df))

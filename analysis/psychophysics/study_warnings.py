@@ -1,9 +1,11 @@
 """Warnings that a reader of a study's results must know, as sentences."""
 
+import math
 from collections.abc import Iterable, Sequence
 
 from scipy.stats import binom
 
+from analysis.psychophysics.bias import criterion_variance
 from analysis.psychophysics.catch_trials import CatchTally, wilson_interval
 from analysis.psychophysics.criterion_drift import criterion_drifts
 from analysis.psychophysics.detection import directions_below_detection
@@ -19,7 +21,10 @@ FEW_PARTICIPANTS = 5
 """Number of participants below which means and their comparison say little about people in general."""
 STRONG_BIAS = 0.6
 """Criterion beyond which response bias costs a staircase four in a hundred right answers. An observer
-without bias exceeds it by chance in about one of 250 runs."""
+without bias exceeds it by chance in about one of 250 whole runs."""
+BIAS_ERRORS = 2.58
+"""Standard errors by which a criterion must differ from 0, too: in unfinished runs of 3 to 12 trials, one in ten of an
+observer without bias exceeds `STRONG_BIAS`. 1 % by chance; in 45 trials or more `STRONG_BIAS` asks more."""
 DRIFT_LEVEL, LEFT_OUT_LEVEL = 0.02, 0.2
 """Levels of the test of a drifting criterion, by session: of all runs, and of those without any one of them. Together
 they named 3 of 1000 honest simulated sessions, and 438 of 1000 whose criterion moved by 0.3 in 100 trials
@@ -172,11 +177,17 @@ def _bias_warning(rows: Sequence[Threshold]) -> str:
     leaning = [
         f"{_run_text(row)} (criterion {signed_number(row.criterion)})"
         for row in rows
-        if row.criterion is not None and abs(row.criterion) > STRONG_BIAS
+        if row.criterion is not None and _leans(row, row.criterion)
     ]
     if not leaning:
         return ""
     return f"A bias towards one of the two answers, which raises a threshold, shows in {conjoin(leaning)}."
+
+
+def _leans(row: Threshold, criterion: float) -> bool:
+    """The variance is that of a run that showed both directions equally often."""
+    half, right = row.trials / 2.0, round(row.trials * (row.percent_correct or 0.0) / 100.0)
+    return abs(criterion) > max(STRONG_BIAS, BIAS_ERRORS * math.sqrt(criterion_variance(right, half, half)))
 
 
 def _drift_warning(trials: Iterable[Trial]) -> str:

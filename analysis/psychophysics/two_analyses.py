@@ -98,6 +98,8 @@ def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: Stair
     by_frequency = {contrast.frequency_hz: contrast for contrast in means}
     against = f"{primary.frequencies_hz[0]:g} Hz"
     pairs = [(contrast, by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]
+    if not pairs:
+        return f"The model tells no difference to {against}."
     if not any(mean for _, mean in pairs):
         return f"{capitalised(named)} tell no difference to {against} yet that could be held against the model's."
     apart = [
@@ -121,7 +123,7 @@ def _verdict_text(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
         if (tukey := pairs.get(frequency_name(contrast.frequency_hz))) is not None
         and (tukey < 0.05) != (contrast.p_holm < 0.05)
     ]
-    if not pairs:
+    if not any(frequency_name(contrast.frequency_hz) in pairs for contrast in primary.contrasts):
         return ""
     if not split:
         return f"Both agree which frequencies differ from {lowest} at the 5 % level."

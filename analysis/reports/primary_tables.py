@@ -81,9 +81,10 @@ def _measured(analysis: StudyAnalysis, name: str) -> tuple[str, ...]:
 
 def _overall(primary: PrimaryAnalysis) -> str:
     overall = primary.overall
+    people = f" ({overall.participants} people with enough answers at each)" if overall.left_out else ""
     test = (
-        f"Frequencies differ: F = {number(overall.f)}, Huynh-Feldt epsilon {number(overall.epsilon_huynh_feldt)}, "
-        f"{p_text(overall.p_huynh_feldt)}. "
+        f"Frequencies differ{people}: F = {number(overall.f)}, Huynh-Feldt epsilon "
+        f"{number(overall.epsilon_huynh_feldt)}, {p_text(overall.p_huynh_feldt)}. "
         if overall.f is not None
         else ""
     )
@@ -94,7 +95,16 @@ def _overall(primary: PrimaryAnalysis) -> str:
         f"bias {number(primary.criterion_sd)} (standard deviation, in units of d')."
         + ("" if primary.converged else " The search ended before it had settled: do not use these numbers.")
         + undetermined_words(primary)
+        + far_above_words(primary)
     )
+
+
+def far_above_words(primary: PrimaryAnalysis) -> str:
+    """A sentence with a space before it where frequencies cannot be compared with each other; else nothing."""
+    if len(primary.far_above_hz) < 2:
+        return ""
+    names = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])
+    return f" At {names} the medians lie at more than twice the cap: nothing is known of the differences between these."
 
 
 def undetermined_words(primary: PrimaryAnalysis) -> str:
@@ -134,8 +144,8 @@ def limit_words(primary: PrimaryAnalysis) -> str:
 def _medians(primary: PrimaryAnalysis) -> Table:
     rows = []
     for median in primary.medians:
-        shown = interval_words(median.lower_n, median.upper_n)
-        db = interval_words(median.lower_db, median.upper_db, 1)
+        shown = interval_words(median.lower_n, median.upper_n, median.above_cap)
+        db = interval_words(median.lower_db, median.upper_db, median.above_cap, 1)
         size = "above the cap" if median.above_cap else number(median.newton)
         rows.append(
             (f"{median.frequency_hz:g} Hz", size, shown, NONE if median.above_cap else number(median.db, 1), db)
@@ -149,10 +159,10 @@ def _medians(primary: PrimaryAnalysis) -> Table:
     )
 
 
-def interval_words(lower: float | None, upper: float | None, digits: int = 2) -> str:
-    """Interval of a median as text; the upper end is missing above the cap."""
+def interval_words(lower: float | None, upper: float | None, above_cap: bool, digits: int = 2) -> str:
+    """Interval of a median as text; the upper end is missing above the cap, and both below three people there."""
     if lower is None:
-        return "no lower bound"
+        return "no lower bound" if above_cap else "no interval: too few people"
     return f"above {number(lower, digits)}" if upper is None else f"{number(lower, digits)} to {number(upper, digits)}"
 
 
@@ -178,8 +188,9 @@ def _contrasts(
             for c in rows
         ),
         notes=(
-            f"Within participants, t with n − 1 degrees of freedom. Equivalent: two one-sided tests within "
-            f"±{EQUIVALENCE_DB:g} dB. Spread: Pitman and Morgan, whether people differ equally much at both.",
+            "Within participants, t with n − 1 degrees of freedom; n have enough answers at both. Equivalent: two "
+            f"one-sided tests within ±{EQUIVALENCE_DB:g} dB. Spread: Pitman and Morgan, whether people differ equally "
+            "much at both.",
             *(("* The median is above the cap: only the lower end of the interval is known.",) if above else ()),
             *notes,
         ),

@@ -6,8 +6,9 @@ Each worker imports hapteq itself, so that all must have the same version: other
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import CancelledError, Executor
+from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING
@@ -167,12 +168,49 @@ def own_version() -> str:
         return ""
 
 
-def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
-    found: dict[str, str] = {}
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """The workers of a scheduler."""
+
+    versions: dict[str, str]
+    """Of hapteq, by address; empty where it is not installed."""
+    threads: tuple[int, ...]
+
+
+def _ask(client: "Client") -> _Found:
     try:
-        found = client.run(own_version)
+        versions: dict[str, str] = client.run(own_version)
     except ImportError:  # what a worker without hapteq says of the function that it is sent
-        found = dict.fromkeys(client.scheduler_info()["workers"], "")
+        versions = dict.fromkeys(client.scheduler_info()["workers"], "")
+    workers = client.scheduler_info(n_workers=-1)["workers"].values()
+    return _Found(versions, tuple(worker["nthreads"] for worker in workers))
+
+
+def _ask_in_time(client: "Client", address: str) -> _Found:
+    """distributed waits without a limit for a scheduler that stands still, and for a worker that does."""
+    asked = Future[_Found]()
+
+    def ask() -> None:
+        try:
+            asked.set_result(_ask(client))
+        except BaseException as problem:  # noqa: BLE001 — raised where the result is waited for
+            asked.set_exception(problem)
+
+    threading.Thread(target=ask, daemon=True).start()
+    try:
+        return asked.result(timeout=WORKER_TIMEOUT_S)
+    except TimeoutError as problem:
+        raise StudyError(
+            "The cluster does not answer",
+            f"The scheduler at {address} was reached, but it or a worker said nothing more for {WORKER_TIMEOUT_S:g} s.",
+            "Look at the scheduler, its workers and the network, then run the same command again.",
+            saved="Nothing was begun.",
+        ) from problem
+
+
+def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
+    asked = _ask_in_time(client, address)
+    found = asked.versions
     if not found:
         raise _cluster_error(f"The scheduler at {address} has no workers.", f"Start some: dask worker {address}.")
     own = own_version()
@@ -181,10 +219,10 @@ def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
             f"Workers at {address} have hapteq {', '.join(wrong)}; here it is {own}.",
             "Install the same version for all of them.",
         )
-    threads = [worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values()]
-    if one_thread and max(threads) > 1:
+    threads = max(asked.threads)
+    if one_thread and threads > 1:
         raise _cluster_error(
-            f"Workers at {address} have up to {max(threads)} threads, and this work needs a process for each piece.",
+            f"Workers at {address} have up to {threads} threads, and this work needs a process for each piece.",
             f"Start them with: dask worker {address} --nthreads 1 --nworkers auto.",
         )
 

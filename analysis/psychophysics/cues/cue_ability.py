@@ -99,15 +99,17 @@ class SameLevelFit:
 
 def same_level_difference(values_db: FloatArray, nominal_db: FloatArray, side: FloatArray) -> SameLevelFit | None:
     """Least squares of one participant's values (n,) on a parabola of the level and the side (+1 or -1). None where
-    one direction is missing, or too few trials are left for a spread."""
+    one direction is missing, where each was played at levels of its own that a parabola explains as well, or too few
+    trials are left for a spread."""
     if len(set(side.tolist())) < 2:
         return None
     away = nominal_db - nominal_db.mean()
     design = np.column_stack([side / 2.0, np.ones(len(away)), away, away**2])
     # Levels may be one or two: then the parabola is not determined, and need not be.
     inverse = np.linalg.pinv(design)
-    df = len(away) - int(np.linalg.matrix_rank(design))
-    if df < 1:
+    rank = int(np.linalg.matrix_rank(design))
+    df = len(away) - rank
+    if df < 1 or int(np.linalg.matrix_rank(design[:, 1:])) == rank:
         return None
     fitted = inverse @ values_db
     residual = values_db - design @ fitted

@@ -61,13 +61,13 @@ class CueGap:
 def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
     """Cues by rising frequency; only measured trials."""
     chosen = [t for t in trials if t.phase is Phase.TEST and t.counts and t.delivered_mps2 and t.level_n > 0]
-    turned = _turned_people(chosen)
+    turned = _turned_sessions(chosen)
     found = []
     for frequency_hz in sorted({trial.frequency_hz for trial in chosen}):
         rows = [trial for trial in chosen if trial.frequency_hz == frequency_hz]
         subjects = tuple(dict.fromkeys(trial.subject for trial in rows))
         place = {subject: number for number, subject in enumerate(subjects)}
-        signs = np.array([-1.0 if trial.subject in turned else 1.0 for trial in rows])
+        signs = np.array([-1.0 if (trial.subject, trial.session) in turned else 1.0 for trial in rows])
         found.append(
             DeliveredTrials(
                 frequency_hz=frequency_hz,
@@ -96,12 +96,13 @@ def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
     return tuple(gaps)
 
 
-def _turned_people(trials: list[Trial]) -> frozenset[str]:
-    """People for whom label 1 is the direction at the larger angle."""
-    angles: dict[str, dict[int, float]] = {}
+def _turned_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
+    """Participant and session where label 1 is the direction at the larger angle. Labels go with the session: a
+    participant who comes twice may have them the other way round."""
+    angles: dict[tuple[str, str], dict[int, float]] = {}
     for trial in trials:
         if trial.angle_deg is not None:
-            angles.setdefault(trial.subject, {})[trial.direction_shown] = trial.angle_deg
+            angles.setdefault((trial.subject, trial.session), {})[trial.direction_shown] = trial.angle_deg
     return frozenset(name for name, known in angles.items() if len(known) == 2 and known[1] > known[2])
 
 

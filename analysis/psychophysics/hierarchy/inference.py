@@ -10,11 +10,14 @@ Source: K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986), 13-22; G. Kauermann, R. 
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from analysis.psychophysics.group_contrasts import mean_errors
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from analysis.psychophysics.hierarchy.objective import Objective, Prior
 from analysis.psychophysics.hierarchy.refine import Refinement
@@ -38,9 +41,11 @@ class MedianThreshold:
     frequency_hz: float
     db: float
     lower_db: float | None
-    """Lower bound; None: the answers do not contradict a median `FAR_DB` below the estimate."""
+    """Lower bound; None: the answers do not contradict a median `FAR_DB` below the estimate, or they come from too few
+    people (below the cap from two, above it from one)."""
     upper_db: float | None
-    """None where the median is above the cap: then lower_db is a one-sided bound, and no size is known."""
+    """None where the median is above the cap: then lower_db is a one-sided bound, and no size is known. None, too,
+    where two people or fewer have enough answers."""
     above_cap: bool
 
     @property
@@ -83,35 +88,37 @@ def median_thresholds(
     fit: HierarchicalFit, cap_db: float, confidence: float, prior: Prior | None = None
 ) -> tuple[MedianThreshold, ...]:
     """Two-sided intervals below the cap, one-sided profile bounds above it, each the lower end that a two-sided
-    interval of the confidence has: the data choose which of them is told (see `lower_bound`). With two people there is
-    no interval: a t distribution with one degree of freedom holds nearly every threshold."""
-    pseudo, n = pseudo_thresholds(fit), fit.answers.persons
-    half = student.ppf(0.5 + confidence / 2, n - 1) * pseudo.std(axis=0, ddof=1) / math.sqrt(n)
+    interval of the confidence has: the data choose which of them is told (see `lower_bound`). With two people at a
+    frequency there is no interval: a t distribution with one degree of freedom holds nearly every threshold."""
+    errors = mean_errors(pseudo_thresholds(fit), fit.answers.played)
+    half = student.ppf(0.5 + confidence / 2, errors.df) * errors.error
     medians = []
     for place, frequency_hz in enumerate(fit.answers.frequencies_hz):
-        db = float(fit.means_db[place])
-        if db > cap_db:
-            bound = lower_bound(fit, place, 0.5 + confidence / 2, prior or Prior())
-            medians.append(MedianThreshold(frequency_hz, db, bound, None, True))
-        elif n < FEWEST_PEOPLE:
-            medians.append(MedianThreshold(frequency_hz, db, None, None, False))
-        else:
-            medians.append(MedianThreshold(frequency_hz, db, db - float(half[place]), db + float(half[place]), False))
+        db, people, df = float(fit.means_db[place]), int(errors.people[place]), float(errors.df[place])
+        ends: tuple[float | None, float | None] = None, None
+        if db > cap_db and people > 1:
+            ends = lower_bound(fit, place, 0.5 + confidence / 2, prior or Prior(), df), None
+        elif db <= cap_db and people >= FEWEST_PEOPLE:
+            ends = db - float(half[place]), db + float(half[place])
+        medians.append(MedianThreshold(frequency_hz, db, *ends, db > cap_db))
     return tuple(medians)
 
 
-def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prior) -> float | None:
+def lower_bound(
+    fit: HierarchicalFit, place: int, confidence: float, prior: Prior, df: float | None = None
+) -> float | None:
     """One-sided bound of a mean by profile likelihood, with the t distribution's quantile in place of the normal's.
 
     A bound that is only told where the estimate is above the cap is wrong more often than its confidence says, where
     the true median is near the cap: then each of the two ends may be wrong by half of what is left, and no more.
     Source: G. J. Feldman, R. D. Cousins, Phys. Rev. D 57 (1998), 3873-3889.
 
-    None where no bound is found within `FAR_DB` below the estimate.
+    df: degrees of freedom, None for those of all persons. None where no bound is found within `FAR_DB` below the
+    estimate.
     """
     search = Refinement(Objective(fit.answers, fit.family, prior))
     best = search.lowest_cost(fit.parameters)
-    wanted = float(student.ppf(confidence, fit.answers.persons - 1))
+    wanted = float(student.ppf(confidence, fit.answers.persons - 1 if df is None else df))
     unit = np.eye(len(fit.parameters))[place]
     along = np.linalg.solve(fit.curvature, unit)
     along = along / along[place]
@@ -143,19 +150,27 @@ def lower_bound(fit: HierarchicalFit, place: int, confidence: float, prior: Prio
 
 
 def direction_limit(
-    frequencies_hz: tuple[float, ...], pseudo: FloatArray, cap_db: float, confidence: float
+    frequencies_hz: tuple[float, ...],
+    pseudo: FloatArray,
+    cap_db: float,
+    confidence: float,
+    known: NDArray[np.bool_] | None = None,
+    shown_above: Sequence[float] = (),
 ) -> DirectionLimit:
     """Estimate the direction limit from pseudo-thresholds (n, k). Between the frequencies played: straight lines over
     the logarithm of frequency. The interval holds every frequency whose median threshold may be the cap: its own
-    interval contains the cap."""
+    interval contains the cap. known: (n, k), see `mean_errors`; None: all. shown_above: frequencies whose median has a
+    profile bound above the cap: there an interval by influence functions is as wide as the model's extrapolation."""
     grid = np.geomspace(frequencies_hz[0], frequencies_hz[-1], 2001)
     weights = np.array([np.interp(np.log(grid), np.log(frequencies_hz), row) for row in np.eye(len(frequencies_hz))])
     lines = pseudo @ weights
-    n = len(pseudo)
     middle = lines.mean(axis=0)
-    half = student.ppf(0.5 + confidence / 2, n - 1) * lines.std(axis=0, ddof=1) / math.sqrt(n)
+    unknown = np.zeros(pseudo.shape) if known is None else (~known).astype(np.float64)
+    errors = mean_errors(lines, unknown @ (weights > 0) == 0)
+    half = student.ppf(0.5 + confidence / 2, errors.df) * errors.error
     crossings = np.flatnonzero((middle[:-1] < cap_db) & (middle[1:] >= cap_db))
     may_be = (middle - half <= cap_db) & (middle + half >= cap_db)
+    may_be[[int(np.abs(grid - frequency_hz).argmin()) for frequency_hz in shown_above]] = False
     # The frequencies of the grid may all miss an interval that is narrower than their distance: the limit lies between
     # that before the crossing and the next.
     may_be[crossings] = may_be[crossings + 1] = True

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.psychophysics.group_contrasts import Contrast, contrasts, pair_contrast
 from analysis.psychophysics.hierarchy.answers import Answers
@@ -24,6 +25,10 @@ from protocols.procedure.staircase import to_db
 
 CONFIDENCE = 0.95
 """Default confidence of all intervals."""
+FAR_ABOVE_DB = 6.0
+"""Of two medians that both lie this far above the cap no difference is told: the right answers are hardly more than
+chance at all levels, the sizes are extrapolated, and their differences have no known error."""
+FAR_ABOVE = "The medians lie at more than twice the cap: nothing is known of their differences."
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +75,8 @@ class PrimaryAnalysis:
     """Frequencies of the protocol without any answer: the model leaves them out."""
     declared_contrast: Contrast | None = None
     """Result for the protocol's declared pair; None where none is declared, or where it cannot be tested."""
+    far_above_hz: tuple[float, ...] = ()
+    """Frequencies whose medians lie `FAR_ABOVE_DB` above the cap; two of them have no contrast."""
 
 
 def primary_analysis(
@@ -87,18 +94,20 @@ def primary_analysis(
     if len(answers.frequencies_hz) < 2:
         return None
     fit = fit_hierarchy(answers, family)
-    pseudo, cap_db, frequencies = pseudo_thresholds(fit), to_db(cap_n), answers.frequencies_hz
+    cap_db, frequencies = to_db(cap_n), answers.frequencies_hz
     parameters, k, sds = fit.parameters, fit.layout.k, np.exp(fit.parameters[fit.layout.log_sds])
     persons = estimate_persons(answers.subjects, np.hstack([fit.latent[:, :-2], fit.shared_means]), cap_db)
+    medians, compared = median_thresholds(fit, cap_db, confidence), _compare(fit, cap_db, confidence, declared_hz)
+    above = [m.frequency_hz for m in medians if m.above_cap and m.lower_db is not None and m.lower_db > cap_db]
     return PrimaryAnalysis(
         family=family,
         trials=answers.trials,
         frequencies_hz=frequencies,
         confidence=confidence,
-        medians=median_thresholds(fit, cap_db, confidence),
-        overall=repeated_measures(answers.subjects, pseudo.tolist()),
-        contrasts=contrasts(frequencies, pseudo, confidence),
-        limit=direction_limit(frequencies, pseudo, cap_db, confidence),
+        medians=medians,
+        overall=compared.overall,
+        contrasts=compared.contrasts,
+        limit=direction_limit(frequencies, pseudo_thresholds(fit), cap_db, confidence, answers.played, above),
         persons=persons,
         runs=run_likelihoods(answers, _nuisances(fit, persons), cap_db, family, confidence),
         person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),
@@ -109,8 +118,69 @@ def primary_analysis(
         goodness=goodness_of_fit(fit),
         converged=fit.converged,
         missing_hz=tuple(frequency_hz for frequency_hz in asked_hz if frequency_hz not in frequencies),
-        declared_contrast=pair_contrast(frequencies, pseudo, declared_hz, confidence),
+        declared_contrast=compared.declared,
+        far_above_hz=compared.far_above_hz,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Compared:
+    """Differences between frequencies."""
+
+    overall: RepeatedMeasures
+    contrasts: tuple[Contrast, ...]
+    declared: Contrast | None
+    far_above_hz: tuple[float, ...]
+
+
+def _compare(fit: HierarchicalFit, cap_db: float, confidence: float, declared_hz: Sequence[float]) -> _Compared:
+    frequencies, played, pseudo = fit.answers.frequencies_hz, fit.answers.played, pseudo_thresholds(fit)
+    far = fit.means_db > cap_db + FAR_ABOVE_DB
+    far_hz = tuple(frequency_hz for frequency_hz, is_far in zip(frequencies, far, strict=True) if is_far)
+    # The first is the reference: from one far above the cap, another such has no difference.
+    told = np.flatnonzero(~(far & far[0]) | (np.arange(len(far)) == 0))
+    hz = tuple(frequencies[place] for place in told)
+    declared = None
+    if not set(declared_hz) <= set(far_hz):
+        declared = pair_contrast(frequencies, pseudo, declared_hz, confidence, played)
+    return _Compared(
+        overall=_overall(fit.answers, pseudo, fit.family, far),
+        contrasts=contrasts(hz, pseudo[:, told], confidence, played[:, told]),
+        declared=declared,
+        far_above_hz=far_hz,
+    )
+
+
+def _overall(answers: Answers, pseudo: FloatArray, family: Family, far: NDArray[np.bool_]) -> RepeatedMeasures:
+    """Analysis of variance within participants; none where all medians lie far above the cap. Of those without answers
+    at some frequency a pseudo-threshold there says nothing: they are left out, and the model is fitted to the others
+    alone."""
+    if far.all():
+        empty = repeated_measures((), ())
+        return replace(empty, participants=answers.persons, conditions=len(far), notes=(FAR_ABOVE,))
+    whole: NDArray[np.bool_] = np.asarray(answers.played.all(axis=1))
+    values = np.full(pseudo.shape, np.nan)
+    if whole.all():
+        values = pseudo
+    elif whole.sum() > 1:
+        values[whole] = pseudo_thresholds(fit_hierarchy(answers_of(answers, whole), family))
+    return repeated_measures(answers.subjects, values.tolist())
+
+
+def answers_of(answers: Answers, chosen: NDArray[np.bool_]) -> Answers:
+    """Answers of some of the persons. chosen: (persons,)."""
+    k, cells = len(answers.frequencies_hz), chosen[answers.person]
+    subjects = tuple(subject for subject, kept in zip(answers.subjects, chosen, strict=True) if kept)
+    number = np.cumsum(chosen) - 1
+    return Answers(
+        subjects=subjects,
+        frequencies_hz=answers.frequencies_hz,
+        run=(number[answers.person] * k + answers.run % k)[cells],
+        level_db=answers.level_db[cells],
+        side=answers.side[cells],
+        right=answers.right[cells],
+        wrong=answers.wrong[cells],
+    )
 
 
 def _nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[Nuisance]:

@@ -22,7 +22,7 @@ from study.errors import StudyError, WrongUseError
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
 from study.store.disk.privacy import make_folder
-from study.store.disk.text_file import read_text
+from study.store.disk.text_file import read_text, write_text
 from study.workflows.run_on_executor import finished_pieces
 
 CHUNK = 10
@@ -123,16 +123,14 @@ def _plan_facts(plan: PowerPlan) -> dict[str, object]:
 
 
 def _read_finished(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict]]:
-    """Results of an interrupted run of the same plan; an incomplete last line is ignored."""
-    if not path.exists():
-        try:
-            make_folder(path.parent)
-        except OSError as problem:
-            raise CannotWriteError(path.parent, problem) from problem
-        _append(path, {"plan": _plan_facts(plan)})
+    """Results of an interrupted run of the same plan; an incomplete last line is ignored, also where it is the first,
+    the plan."""
+    text = read_text(path) if path.exists() else ""
+    if _first_row(plan).startswith(text):
+        _begin(path, plan)
         return {}
     rows = []
-    for line in read_text(path).splitlines():
+    for line in text.splitlines():
         try:
             rows.append(json.loads(line))
         except ValueError:
@@ -145,6 +143,18 @@ def _read_finished(path: Path, plan: PowerPlan) -> dict[Piece, list[StudyVerdict
             saved="Nothing was changed.",
         )
     return {(row["piece"][0], row["piece"][1]): [StudyVerdict(**v) for v in row["verdicts"]] for row in rows[1:]}
+
+
+def _first_row(plan: PowerPlan) -> str:
+    return json.dumps({"plan": _plan_facts(plan)})
+
+
+def _begin(path: Path, plan: PowerPlan) -> None:
+    try:
+        make_folder(path.parent)
+    except OSError as problem:
+        raise CannotWriteError(path.parent, problem) from problem
+    write_text(path, _first_row(plan), overwrite=True)
 
 
 def _append(path: Path, row: dict[str, object]) -> None:

@@ -94,9 +94,9 @@ def _primary_lines(analysis: StudyAnalysis) -> list[str]:
         return []
     lines = [f"{'frequency':>10}  {'median':>10}  95 % interval, all answers in one model"]
     for median in analysis.primary.medians:
-        value = f"{median.newton:.3f} N" if median.upper_n is not None else "above cap"
+        value = "above cap" if median.above_cap else f"{median.newton:.3f} N"
         unit = " N" if median.lower_n is not None else ""
-        interval = interval_words(median.lower_n, median.upper_n, 3) + unit
+        interval = interval_words(median.lower_n, median.upper_n, median.above_cap, 3) + unit
         lines.append(f"{median.frequency_hz:7g} Hz  {value:>10}  {interval}")
     return [*lines, limit_words(analysis.primary), analysis.compared]
 

@@ -18,7 +18,14 @@ from study.store.disk.provenance import gather_provenance
 from study.store.formats import tidy_csv
 from study.store.formats.answer_table import answer_table
 from study.store.formats.bids_behaviour import write_bids
-from study.store.formats.psych_ds import KIND, PROTOCOL_NAME, is_psych_ds, read_psych_ds, write_psych_ds
+from study.store.formats.psych_ds import (
+    DESCRIPTION_NAME,
+    KIND,
+    PROTOCOL_NAME,
+    is_psych_ds,
+    read_psych_ds,
+    write_psych_ds,
+)
 from study.store.formats.trials_mat import write_trials_mat
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.written_elsewhere import note_written
@@ -26,6 +33,7 @@ from study.workflows.results.collected import CollectedTrials
 
 MOST_LEFT_OUT = 10_000
 """A larger number in an edited file is no number of sessions."""
+EXPORT_AGAIN = "Export the study again, or restore the file from a copy."
 Form = Literal["psych-ds", "bids", "mat", "csv"]
 """Form of an export, as the command line takes it."""
 WRITERS: dict[str, Callable[..., tuple[Path, ...]]] = {
@@ -106,6 +114,22 @@ def _qualities(facts: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     return tuple((str(row[0]), str(row[1])) for row in rows if isinstance(row, list) and len(row) == 2)
 
 
+def _seeds(facts: Mapping[str, Any], path: Path, kind: str) -> dict[str, int]:
+    """Seeds by session; none where an export does not say. Raises UnusableFileError."""
+    found = facts.get("seeds", {})
+    if not isinstance(found, dict) or any(type(seed) is not int for seed in found.values()):
+        raise UnusableFileError(path, kind, ("its seeds are no whole numbers by session",), EXPORT_AGAIN)
+    return found
+
+
+def _names(facts: Mapping[str, Any], key: str, path: Path, kind: str) -> tuple[str, ...]:
+    """A list of texts; empty where an export does not say. Raises UnusableFileError."""
+    found = facts.get(key, [])
+    if not isinstance(found, list) or not all(isinstance(name, str) for name in found):
+        raise UnusableFileError(path, kind, (f"its {key} are no list of texts",), EXPORT_AGAIN)
+    return tuple(found)
+
+
 def is_exported(folder: Path) -> bool:
     """Whether `collect_exported` takes it."""
     return is_psych_ds(folder) or tidy_csv.is_tidy_csv(folder)
@@ -117,23 +141,28 @@ def collect_exported(folder: Path) -> CollectedTrials:
     psych_ds = is_psych_ds(folder)
     found = read_psych_ds(folder) if psych_ds else tidy_csv.read_tidy_csv(folder)
     path, kind = folder / (PROTOCOL_NAME if psych_ds else tidy_csv.PROTOCOL_NAME), KIND if psych_ds else tidy_csv.KIND
+    facts_path = folder / (DESCRIPTION_NAME if psych_ds else tidy_csv.FACTS_NAME)
     try:
         protocol = load_protocol(found.protocol_text, path.name)
     except ProtocolError as error:
         raise UnusableFileError(path, kind, tuple(str(each) for each in error.problems)) from error
     if not isinstance(protocol, StudyProtocol):
         raise UnusableFileError(path, kind, ("it is no protocol of a study",))
+    if found.facts.get("protocol_hash", protocol_hash(protocol)) != protocol_hash(protocol):
+        raise UnusableFileError(
+            path, kind, (f"it was changed since the export: its hash is not that of {facts_path.name}",), EXPORT_AGAIN
+        )
     _check_rows(folder, found.trials, kind)
-    seeds = found.facts.get("seeds", {})
+    seeds = _seeds(found.facts, facts_path, kind)
     sessions = tuple(dict.fromkeys(trial.session for trial in found.trials))
     return CollectedTrials(
         protocol=protocol,
         protocol_hash=protocol_hash(protocol),
         trials=found.trials,
         sessions=tuple(SessionFolder(folder / name) for name in sessions),
-        seeds=tuple(int(seeds.get(name, 0)) for name in sessions),
-        devices=tuple(map(str, found.facts.get("devices", ()))),
-        observers=tuple(map(str, found.facts.get("observers", ()))),
+        seeds=tuple(seeds.get(name, 0) for name in sessions),
+        devices=_names(found.facts, "devices", facts_path, kind),
+        observers=_names(found.facts, "observers", facts_path, kind),
         left_out=_left_out(found.facts),
         qualities=_qualities(found.facts),
         locked=str(found.facts.get("locked", "not known")),

@@ -55,6 +55,15 @@ def test_people_keep_their_markers_and_stand_hollow_above_the_cap(primary):
     assert axes.get_ylim()[1] > 1.12 * CAP_N
 
 
+def test_a_person_is_drawn_at_the_frequencies_with_answers_alone(primary):
+    gone = (primary.persons[2].subject, 25.0)
+    runs = tuple(run for run in primary.runs if (run.subject, run.frequency_hz) != gone)
+    assert len(runs) == len(primary.runs) - 1
+    axes = draw_medians(replace(primary, runs=runs), CAP_N).axes[0]
+    third = [line for line in axes.lines if line.get_marker() == MARKERS[2] and line.get_markersize() == 6]
+    assert [round(float(line.get_xdata()[0])) for line in third] == [0, 2]
+
+
 def test_the_direction_limit_lies_on_the_cap_between_its_frequencies(primary):
     axes = draw_medians(primary, CAP_N).axes[0]
     (mark,) = [line for line in axes.lines if line.get_marker() == "D" and line.get_markersize() == 8]
@@ -75,6 +84,23 @@ def test_without_a_bound_the_arrow_begins_at_the_axis_and_without_a_limit_there_
     assert arrow.xyann[1] == pytest.approx(axes.get_ylim()[0])
     assert not any(line.get_marker() == "D" and line.get_markersize() == 8 for line in axes.lines)
     assert not any("limit" in text.get_text() for text in figure.legends[0].get_texts())
+
+
+@pytest.mark.parametrize("bound_n", [4.0, 6.0, 12.0, 400.0])
+def test_the_arrow_of_a_bound_points_up_within_the_axis_however_high_the_bound_is(primary, bound_n):
+    """A bound above the end of the axis drew it downwards, outside."""
+    high = replace(primary.medians[2], lower_db=20.0 * np.log10(bound_n))
+    axes = draw_medians(replace(primary, medians=(*primary.medians[:2], high)), CAP_N).axes[0]
+    (arrow,) = arrows(axes, (0.0, 0.0, 0.0))
+    begin, end, top = arrow.xyann[1], arrow.xy[1], axes.get_ylim()[1]
+    assert begin < end <= top <= 8.0 * CAP_N
+    assert begin == pytest.approx(bound_n) or top == 8.0 * CAP_N
+
+
+def test_the_interval_of_a_median_near_the_cap_ends_within_the_axis(primary):
+    wide = replace(primary.medians[1], upper_db=20.0 * np.log10(5.0))
+    axes = draw_medians(replace(primary, medians=(primary.medians[0], wide, primary.medians[2])), CAP_N).axes[0]
+    assert axes.get_ylim()[1] > 5.0
 
 
 def test_no_text_is_cut_off_or_lies_on_another(primary):

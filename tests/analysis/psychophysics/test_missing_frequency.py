@@ -5,13 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import sem
 
+from analysis.psychophysics.group_contrasts import mean_errors
 from analysis.psychophysics.hierarchy.answers import count_answers
-from analysis.psychophysics.hierarchy.primary import primary_analysis
+from analysis.psychophysics.hierarchy.primary import answers_of, primary_analysis
+from analysis.psychophysics.power.simulated_study import Crowd
+from analysis.psychophysics.power.simulated_study import simulate_study as simulate_crowd
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
 from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.trial import TrialStatus
+from tests.analysis.conftest import PUBLISHED
+from tests.references.coverage_outside_the_model import with_few
 
 PLAYED = (5.0, 25.0, 45.0)
 LOW = (0.2, 0.2, 0.3, 0.5, 0.8)
@@ -66,3 +72,66 @@ def test_a_declared_contrast_with_a_missing_frequency_is_not_known(trials, proto
     by_model, _ = analyse_study(without(trials, 35.0), declared).declared_result.results
     assert by_model.difference is None
     assert by_model.notes == ("There is no answer at 35 Hz yet.",)
+
+
+STUDY = simulate_crowd(Crowd((5.0, 25.0, 45.0), (0.4, 0.7, 1.0)), PUBLISHED, 10, (19, 1)).answers
+
+
+@pytest.mark.parametrize("count", [0, 8])
+def test_what_a_single_person_played_has_no_interval(count):
+    """The estimate follows the one who played, whose spread is not known: it held the truth in half of the studies."""
+    found = primary_analysis(with_few(STUDY, 1, count), 3.0, declared_hz=(45.0, 5.0))
+    assert [c.frequency_hz for c in found.contrasts] == [25.0]
+    assert found.declared_contrast is None
+    assert found.medians[2].lower_db is None and found.medians[2].upper_db is None
+    assert found.medians[1].lower_db < found.medians[1].db < found.medians[1].upper_db
+    assert found.limit.lower_hz is None or found.limit.lower_hz > 25.0
+
+
+def test_few_people_at_a_frequency_count_as_few():
+    few, all_of_them = primary_analysis(with_few(STUDY, 3, 0), 3.0), primary_analysis(STUDY, 3.0)
+    assert [c.participants for c in few.contrasts] == [10, 3]
+    assert few.contrasts[1].effect_size is None and few.contrasts[1].p_spread is None
+    widths = [found.medians[2].upper_db - found.medians[2].lower_db for found in (few, all_of_them)]
+    assert widths[0] > 1.4 * widths[1]
+    assert few.overall.participants == 3 and few.overall.left_out == STUDY.subjects[3:]
+    assert few.overall == replace(
+        primary_analysis(answers_of(STUDY, np.arange(10) < 3), 3.0).overall,
+        left_out=few.overall.left_out,
+        notes=few.overall.notes,
+    )
+
+
+def test_short_runs_of_all_are_not_few():
+    """A protocol of short runs: all have as many answers as anyone."""
+    short = with_few(STUDY, 0, 12)
+    assert short.played.all()
+
+
+def test_errors_of_means_are_the_textbooks_where_all_have_answers_and_grow_to_those_of_the_few():
+    values = np.random.default_rng(4).normal(0.0, 2.0, (10, 2))
+    known = np.ones((10, 2), dtype=bool)
+    whole = mean_errors(values, known)
+    np.testing.assert_allclose(whole.error, sem(values), rtol=1e-12)
+    assert whole.df.tolist() == [9.0, 9.0]
+    # Seven people without answers of their own, whose values say nothing: the mean of three, weighted by 10 / 3.
+    values[3:, 1], known[3:, 1] = 0.0, False
+    values[:3, 1] -= values[:3, 1].mean()
+    few = mean_errors(values, known)
+    assert few.error[1] == pytest.approx(sem(values[:3, 1] * 3 / 10))
+    assert few.df.tolist() == [9.0, pytest.approx(2.0)]
+    known[2, 1] = known[1, 1] = False
+    assert mean_errors(values, known).error[1] == np.inf
+
+
+@pytest.mark.slow
+def test_intervals_hold_where_few_of_the_people_played_a_frequency():
+    """Of 40 studies with whole runs of two people in ten, four fifths held the truth when all ten counted."""
+    crowd = Crowd((5.0, 25.0, 45.0), (0.4, 0.7, 1.0))
+    true_db = 20.0 * np.log10(1.0 / 0.4)
+    held = 0
+    for seed in range(40):
+        answers = simulate_crowd(crowd, PUBLISHED, 10, (19, 2, seed)).answers
+        (found,) = primary_analysis(with_few(answers, 2, 8), 3.0).contrasts[1:]
+        held += found.lower_db <= true_db <= found.upper_db
+    assert held >= 36

@@ -6,8 +6,11 @@ import pytest
 from analysis.psychophysics.anova import one_way_anova
 from analysis.psychophysics.repeated_measures import repeated_measures
 from analysis.psychophysics.study_analysis import analyse_study, design_difference
+from analysis.psychophysics.study_warnings import STRONG_BIAS
+from analysis.psychophysics.thresholds import thresholds
 from protocols.procedure.run_rules import staircase_rule
 from protocols.trial import Phase, TrialStatus
+from tests.analysis.conftest import simulated_run
 
 
 @pytest.fixture
@@ -79,6 +82,19 @@ def test_a_response_bias_is_named(able, protocol):
     (bias,) = warnings(leaning, protocol)
     assert bias.startswith("A bias towards one of the two answers, which raises a threshold, shows in s01 at ")
     assert "(criterion −" in bias
+
+
+def test_three_answers_of_an_unfinished_run_show_no_bias(able, protocol):
+    """All three answered 1, of which one was wrong: one in ten of the unbiased has as much."""
+    shown = (1, 1, 2)
+    short = [
+        replace(trial, direction_shown=shown[trial.trial - 1], answer=1)
+        for trial in simulated_run(0.5, np.random.default_rng(44), subject="s09", session="9", frequency_hz=15.0)[:3]
+    ]
+    assert [trial.correct for trial in short] == [True, True, False]
+    (row,) = thresholds(short, protocol.staircase)
+    assert abs(row.criterion) > STRONG_BIAS
+    assert not any("A bias towards" in sentence for sentence in warnings(short, protocol))
 
 
 def test_spoiled_flagged_and_unmeasured_trials_are_counted(able, protocol):

@@ -8,6 +8,7 @@ import pytest
 
 from analysis.psychophysics.coverage.coverage_words import coverage_sentence
 from analysis.psychophysics.coverage.measured_coverage import MEASURED
+from analysis.psychophysics.hierarchy.primary import FAR_ABOVE
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
 from analysis.psychophysics.two_analyses import SIMULATED_RULE, comparison_text, declaration_text
 from analysis.reports.study_report import render_study_report
@@ -47,6 +48,28 @@ def test_a_missing_lower_bound_is_reported_on_the_page_and_in_the_terminal(analy
     for shown in (lambda a: render_study_report(a, (), {}, "2026-01-02T03:04:05Z"), lambda a: "".join(text_table(a))):
         assert "no lower bound" in shown(unbounded)
         assert "no lower bound" not in shown(analysis)
+
+
+def test_two_people_have_medians_without_an_interval_and_not_above_the_cap(protocol, simulate_study):
+    analysis = analyse_study(simulate_study(subjects=2, true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
+    page, lines = render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z"), "\n".join(text_table(analysis))
+    assert f"{analysis.primary.medians[0].newton:.3f} N  no interval: too few people" in lines
+    assert "above cap" not in lines
+    assert "no interval: too few people" in page and "no lower bound" not in page
+
+
+def test_frequencies_far_above_the_cap_are_not_compared_and_the_report_says_so(protocol, simulate_study):
+    guessing = float("inf")
+    declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 35.0)))
+    analysis = analyse_study(simulate_study(true_n=(0.3, 0.4, 0.6, guessing, guessing)), declared)
+    page = html.unescape(render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z"))
+    said = "At 35 Hz and 45 Hz the medians lie at more than twice the cap: nothing is known of the differences"
+    assert said in page
+    by_model = analysis.declared_result.results[0]
+    assert by_model.p is None and by_model.notes == (FAR_ABOVE,)
+    analysis = analyse_study(simulate_study(true_n=(guessing,) * 5), protocol)
+    assert "The model tells no difference to 5 Hz." in analysis.compared
+    assert "Both agree" not in analysis.compared and "they disagree" not in analysis.compared
 
 
 def test_each_interval_near_the_cap_carries_the_coverage_that_was_measured_for_it(analysis, protocol, simulate_study):

@@ -14,6 +14,7 @@ from protocols.definition.participant_text import Question
 from protocols.trial import Trial
 from study.cli.main import main
 from study.store.disk.csv_rows import columns
+from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 from study.store.formats.trials_file import read_trials
@@ -102,6 +103,35 @@ def test_a_count_that_is_none_is_not_believed(data, tmp_path, count):
     assert changed != written
     facts.write_text(changed, "utf-8")
     assert collect_exported(tmp_path / "ds").left_out == ()
+
+
+@pytest.mark.parametrize("form", ["psych-ds", "csv"])
+def test_a_declaration_that_was_changed_after_the_export_is_refused(data, tmp_path, capsys, form):
+    """The facts beside it say whether it was locked before the data."""
+    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", form]) == 0
+    (protocol,) = (tmp_path / "ds").rglob("protocol.toml")
+    text = protocol.read_text("utf-8")
+    protocol.write_text(f"# A comment changes nothing.\n{text}", "utf-8")
+    assert collect_exported(tmp_path / "ds").locked
+    declared = re.sub(r"\[analysis\]\n(.+\n)*", "", text)
+    protocol.write_text(declared + '\n[analysis]\nprimary = "hierarchical"\n', "utf-8")
+    capsys.readouterr()
+    assert main(["analyze", str(tmp_path / "ds"), "--out", str(tmp_path / "out")]) == 1
+    assert "It was changed since the export: its hash is not that of" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("seeds", []), ("seeds", None), ("seeds", {"P01_001": "one"}), ("seeds", {"P01_001": None}),
+     ("devices", None), ("devices", 5), ("devices", "omega"), ("observers", [None])],
+)  # fmt: skip
+def test_facts_of_another_kind_are_refused_in_words(data, tmp_path, key, value):
+    assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", "csv"]) == 0
+    facts = tmp_path / "ds" / "facts.json"
+    facts.write_text(json.dumps({**json.loads(facts.read_text("utf-8")), key: value}), "utf-8")
+    with pytest.raises(UnusableFileError, match=rf"Its {key} are no "):
+        collect_exported(tmp_path / "ds")
 
 
 def test_every_fact_of_an_export_is_described(data, tmp_path):

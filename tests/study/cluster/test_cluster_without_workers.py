@@ -140,6 +140,26 @@ def test_a_scheduler_that_stands_still_ends_the_work_in_words(scheduler, monkeyp
     assert address in str(ended.value) and ended.value.saved == "What was finished is kept."
 
 
+def test_a_scheduler_that_stands_still_after_it_was_reached_ends_before_anything_is_begun(scheduler, monkeypatch):
+    process, address = scheduler
+    own = distributed.Client
+
+    def reach(*args, **settings):
+        client = own(*args, **settings)
+        process.send_signal(signal.SIGSTOP)
+        return client
+
+    with a_worker(address):
+        monkeypatch.setattr(cluster, "WORKER_TIMEOUT_S", 2.0)
+        monkeypatch.setattr(distributed, "Client", reach)
+        began = time.monotonic()
+        with pytest.raises(StudyError, match="The cluster does not answer") as ended, cluster_workers(address):
+            pass
+        monkeypatch.setattr(distributed, "Client", own)
+    assert time.monotonic() - began < 30.0
+    assert address in str(ended.value) and ended.value.saved == "Nothing was begun."
+
+
 def test_ctrl_c_ends_the_wait_for_a_scheduler_that_stands_still(scheduler):
     process, address = scheduler
     main = threading.main_thread().ident

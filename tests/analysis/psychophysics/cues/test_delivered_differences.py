@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB
+from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB, same_level_difference
 from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
 from analysis.psychophysics.cues.delivered_cues import Cue, cue_gaps
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
@@ -84,6 +84,29 @@ def test_swapped_labels_do_not_cancel_a_difference_of_the_device(simulate_study)
         trials.append(replace(trial, angle_deg=45.0 if plus else -45.0, delivered_mps2=strength))
     first = next(each for each in cue_findings(trials) if each.cue is Cue.INTENSITY)
     assert [each.difference_db for each in first.people] == pytest.approx([-20 * np.log10(2.0)] * 4)
+
+
+def test_labels_may_be_the_other_way_round_in_a_second_session_of_the_same_person(simulate_study):
+    trials = []
+    for trial in simulate_study(2, ABLE_N, 3):
+        swapped = trial.subject == "s02"
+        plus = (trial.direction_shown == 1) != swapped
+        strength = 4.0 * trial.level_n * (2.0 if plus else 1.0)
+        angle = 45.0 if plus else -45.0
+        trials.append(replace(trial, subject="s01", session=trial.subject, angle_deg=angle, delivered_mps2=strength))
+    first = next(each for each in cue_findings(trials) if each.cue is Cue.INTENSITY)
+    assert [each.difference_db for each in first.people] == pytest.approx([-20 * np.log10(2.0)])
+
+
+def test_directions_that_were_played_at_levels_of_their_own_have_no_difference():
+    """Three trials, the other direction once, louder: level or direction, the data do not say which."""
+    assert (
+        same_level_difference(np.array([0.0, 0.1, 6.0]), np.array([0.0, 0.0, 4.0]), np.array([1.0, 1.0, -1.0])) is None
+    )
+    # As many levels, but one of them in both directions.
+    values, level, side = np.array([0.0, 3.0, 0.2, 3.3, 6.0]), np.array([0.0, 0.0, 0.0, 0.0, 4.0]), [1, -1, 1, -1, -1]
+    fit = same_level_difference(values, level, np.array(side, dtype=float))
+    assert fit.difference_db == pytest.approx(-3.05) and fit.df == 2
 
 
 def test_without_measurements_nothing_is_said(simulate_study):

@@ -13,7 +13,7 @@ from analysis.psychophysics.hierarchy.inference import (
     median_thresholds,
     pseudo_thresholds,
 )
-from analysis.psychophysics.hierarchy.primary import primary_analysis
+from analysis.psychophysics.hierarchy.primary import FAR_ABOVE, primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED, simulated_run
 
@@ -91,6 +91,21 @@ def test_guessers_leave_everything_finite():
     assert found.medians[1].above_cap
 
 
+def test_nothing_is_known_of_differences_between_frequencies_that_no_one_tells():
+    """Two medians of 30 dB above the cap have no difference: of guessers, half of such contrasts had p below 0.05."""
+    (study,) = studies(Crowd((5.0, 35.0, 45.0), (0.5, 1e4, 1e4)), 1, people=6)
+    found = primary_analysis(study.answers, 3.0, declared_hz=(45.0, 35.0))
+    assert found.far_above_hz == (35.0, 45.0)
+    assert found.declared_contrast is None
+    assert [c.frequency_hz for c in found.contrasts] == [35.0, 45.0]  # to 5 Hz, which is known
+    assert all(c.lower_db > 6.0 for c in found.contrasts)
+    (nothing,) = studies(Crowd((5.0, 45.0), (1e4, 1e4)), 1, people=6)
+    found = primary_analysis(nothing.answers, 3.0)
+    assert found.far_above_hz == (5.0, 45.0)
+    assert found.contrasts == () and found.overall.f is None and found.overall.p_huynh_feldt is None
+    assert found.overall.notes == (FAR_ABOVE,)
+
+
 def test_flat_thresholds_are_equal_and_equivalent():
     crowd = Crowd((5.0, 15.0, 25.0), (0.5, 0.5, 0.5), frequency_sd_db=0.5)
     (study,) = studies(crowd, 1, people=24)
@@ -137,6 +152,18 @@ def test_a_median_that_falls_below_the_cap_again_is_told_beside_the_limit():
     assert float(again[1]) == pytest.approx((35 * 45) ** 0.5, rel=0.02)
     rising = np.array([-8.0, -4.0, 0.0, 8.0, 12.0]) + 0.3 * rng.standard_normal((10, 5))
     assert "again" not in direction_limit(HZ, rising, 10.0, 0.95).words
+
+
+def test_the_limit_is_below_a_frequency_whose_median_is_shown_to_be_above_the_cap():
+    """Far above the cap the influence functions are as wide as the extrapolation: 14 ± 4.5 dB at 45 Hz."""
+    rng = np.random.default_rng(4)
+    pseudo = np.array([-8.0, -4.0, 0.0, 8.0, 14.0]) + np.array([0.3, 0.3, 0.3, 0.3, 8.0]) * rng.standard_normal((10, 5))
+    assert direction_limit(HZ, pseudo, 10.0, 0.95).upper_hz is None
+    found = direction_limit(HZ, pseudo, 10.0, 0.95, shown_above=(45.0,))
+    assert 40.0 < found.upper_hz < 45.0
+    (study,) = studies(Crowd((5.0, 25.0, 45.0), (0.3, 0.5, 8.0)), 1)
+    analysis = primary_analysis(study.answers, 3.0)
+    assert analysis.medians[2].lower_n > 3.0 and analysis.limit.upper_hz < 45.0
 
 
 def test_an_interval_narrower_than_the_grid_still_holds_the_limit():

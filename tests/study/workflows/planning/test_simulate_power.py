@@ -104,6 +104,20 @@ def test_a_broken_run_continues_and_any_number_of_workers_gives_the_same_numbers
     assert judge_piece(plan, (3, 10)) == judge_piece(plan, (3, 10))
 
 
+def test_a_run_that_was_killed_anywhere_goes_on_with_the_same_numbers(run, tmp_path):
+    """Also where it had written nothing, or a part of the plan."""
+    plan = replace(PLAN, people=(2,), studies=2)
+    whole = run(plan)
+    text = (tmp_path / "power" / FINISHED_NAME).read_text("utf-8")
+    plan_ends = text.index("\n")
+    for number, length in enumerate((0, 1, plan_ends // 2, plan_ends, plan_ends + 1, plan_ends + 9, len(text) - 1)):
+        broken = tmp_path / f"broken-{number}"
+        broken.mkdir()
+        (broken / FINISHED_NAME).write_text(text[:length], "utf-8")
+        assert run(plan, broken.name) == whole
+        assert run(plan, broken.name) == whole  # what it left is whole, too
+
+
 def test_a_folder_of_another_plan_is_left_alone(run):
     run(replace(PLAN, people=(4,), studies=10))
     with pytest.raises(StudyError, match="another power simulation"):
