@@ -165,14 +165,20 @@ def test_rivals_are_kept_only_where_they_were_compared(limited_and_late):
     assert len(left.rounds[0]) == 1
 
 
-@pytest.mark.parametrize(("third", "kept"), [("viscous_damping", 2), ("force_saturation", 3)])
-def test_a_third_is_named_only_where_two_leave_more_than_laws_of_real_devices_do(limited_and_late, third, kept):
-    claims = {
-        "viscous_damping": claim("viscous_damping", damping=0.01),
-        "force_saturation": claim("force_saturation", limit=LIMIT_N),
-        "sensor_lag": claim("sensor_lag", bandwidth=LAG_HZ),
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_of_three_goes_the_one_without_which_two_fit_as_well_as_laws_of_real_devices_do(limited_and_late, place):
+    claims = [claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ)]
+    claims.insert(place, claim("viscous_damping", damping=0.01))
+    left = _drop_needless(limited_and_late, found_of(limited_and_late, *claims), always)
+    assert names(left) == ["force_saturation", "sensor_lag"]
+
+
+def test_three_stay_where_any_two_leave_more_than_laws_of_real_devices_do(arena_of):
+    physics = {
+        "force_saturation": {"limit": LIMIT_N},
+        "sensor_lag": {"bandwidth": LAG_HZ},
+        "hardening_stiffness": {"k3": 4e5},
     }
-    order = [each for name, each in claims.items() if name != third]
-    found = found_of(limited_and_late, *order, claims[third])
-    left = _drop_needless(limited_and_late, found, always)
-    assert len(left.steps) == kept
+    context = arena_of(tuple(PlacedEffect(EFFECTS[name], (0,), values) for name, values in physics.items()))
+    found = found_of(context, *(claim(name, **values) for name, values in physics.items()))
+    assert names(_drop_needless(context, found, always)) == sorted(physics)
