@@ -32,7 +32,7 @@
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
   X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                   \
-  X(stop_ignored, 0) X(brakes_told, 0) /* dhdStop answered and not done; brakes on, and force on, as it says */ X(told_nan, 0) /* reports to come that are NaN */ \
+  X(stop_ignored, 0) X(told_speed, 1) X(told_bias, 0) /* the velocity told is so many times the true one, and offset, m/s */ X(silent_bias, 0) /* force along x on top, N */ X(brakes_told, 0) /* dhdStop answered and not done; brakes on, and force on, as it says */ X(told_nan, 0) /* reports to come that are NaN */ \
   X(answer_of_errors, -1) /* of functions that fail */ X(keeps_force, 0) /* a zero is answered and not given */                               \
   X(silent_gain, 1) X(told_step, 0) X(told_noise, 0) X(told_lift, 0) /* scaled without a word; the reported force in steps, with noise (rms), N; its weight held up */ \
   X(silently_n, 1e9) /* a cap of its own, of which no answer says anything */ X(turned, 0) /* force the other way */                                                                  \
@@ -157,7 +157,7 @@ static void step(double dt) {
     drop(3);
   if (p[off_by]) drop((int)p[off_by]);
   for (int i = 0; i < 3; i++) {
-    double applied = p[force_on] && !p[brake] ? command[i] : 0;
+    double applied = p[force_on] && !p[brake] ? command[i] + (i ? 0 : p[silent_bias]) : 0;
     double lift = p[gravity] && p[force_on] ? 9.81 * p[effector] : 0, down = i == 2 && p[weight] > 0 ? p[weight] - lift : 0;
     double rate = 2 * 3.14159265358979 * p[mode_hz], pull = p[mode_kg] * (rate * rate * (w[i] - x[i]) + 0.08 * rate * (u[i] - v[i]));
     double force = p[gain] * applied - (p[damping] + (p[brake] ? 20 : 0)) * v[i] - p[stiffness] * x[i] - down;
@@ -340,7 +340,8 @@ EXPORT int dhdGetPosition(double *px, double *py, double *pz, char id) {
 }
 EXPORT int dhdGetLinearVelocity(double *vx, double *vy, double *vz, char id) {
   (void)id;
-  PLAIN(*vx = v[0]; *vy = v[1]; *vz = v[2]);
+  double k = p[told_speed], off = p[told_bias];
+  PLAIN(*vx = k * v[0] + off; *vy = k * v[1] + off; *vz = k * v[2] + off);
 }
 EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
   (void)id;

@@ -6,6 +6,7 @@ import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
+from study.devices.force_dimension.findings import examine
 from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
@@ -58,6 +59,44 @@ def test_a_reported_force_that_is_no_number_hides_no_wrong_gain(stepped_stub, ri
         assert device.fault() is Fault.LOST
         assert "another force than it was sent" in device.health().why
         assert stepped_stub.get("told_nan") == 0
+
+
+@pytest.mark.parametrize("bias_n", [0.5, -1.0])
+def test_a_force_that_is_added_without_a_word_ends_the_trial(stepped_stub, rigs, bias_n):
+    """It changes no gain. A zero does not take it away, the watchdog does: after the failure nothing is sent."""
+    stepped_stub.set("stiffness", 150)
+    clock = VirtualClock()
+    with contextlib.closing(SafeDevice(stepped_stub.rig(), rigs.SETTINGS, clock)) as device:
+        device.hold(rigs.sine(2.0))
+        clock.sleep(0.25)
+        stepped_stub.set("silent_bias", bias_n)
+        clock.sleep(0.25)
+        assert device.fault() is Fault.LOST
+        assert "another force than it was sent" in device.health().why
+        stepped_stub.advance(0.05)
+        assert stepped_stub.safe
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize(
+    ("switches", "said"),
+    [
+        ({"told_bias": float("nan")}, "the library says nan m/s along z"),
+        ({"told_bias": 5.0}, "the library says 5"),
+        ({"told_speed": 1000, "weight": 2.0}, "by its positions the handle moves at -"),
+        ({"told_speed": -1, "weight": 2.0}, "by its positions the handle moves at -"),
+    ],
+    ids=["no number", "offset", "mm/s", "other way"],
+)
+def test_a_velocity_that_is_not_that_of_the_positions_is_told_and_tells_no_drift(stub, switches, said):
+    """As it would be in mm/s. Whether the handle sinks is told from its positions."""
+    for name, value in switches.items():
+        stub.set(name, value)
+    findings = {finding.name: finding for finding in examine("omega3")}
+    assert said in findings["Velocity"].value and findings["Velocity"].warning
+    sinks = "weight" in switches
+    assert findings["Gravity"].fine is not sinks
+    assert ("sinks" in findings["Gravity"].value) is sinks
 
 
 @pytest.mark.real_time
