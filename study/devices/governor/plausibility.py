@@ -145,16 +145,18 @@ def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
 @part
 def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether an axis has not changed although its share of the force must have moved it, while the others move on."""
-    stale, stretch = False, AXIS_TIMES * settings[STALE_TICKS]
+    stale, stretch, half = False, AXIS_TIMES * settings[STALE_TICKS], 0.5 * settings[RESOLUTION]
     for i in range(3):
         _expect_along_axis(state, settings, i)
-        state[AXIS_UNCHANGED + i] += 1.0
-        changed = abs(reading[i] - state[AXIS_CHANGED + i]) >= 0.5 * settings[RESOLUTION]
-        if not changed and state[AXIS_UNCHANGED + i] % stretch != 0.0:
-            continue
-        expected = state[AXIS_MOST + i] - state[AXIS_LEAST + i] > STEPS_OF_RESOLUTION * settings[RESOLUTION]
-        if changed or not expected:
+        if abs(reading[i] - state[AXIS_CHANGED + i]) >= half:
             state[AXIS_CHANGED + i], state[AXIS_UNCHANGED + i] = reading[i], 0.0
+            state[AXIS_LEAST + i] = state[AXIS_MOST + i] = state[AXIS_EXPECTED + i]
+            continue
+        state[AXIS_UNCHANGED + i] += 1.0
+        if state[AXIS_UNCHANGED + i] % stretch != 0.0:
+            continue
+        if state[AXIS_MOST + i] - state[AXIS_LEAST + i] <= STEPS_OF_RESOLUTION * settings[RESOLUTION]:
+            state[AXIS_UNCHANGED + i] = 0.0
         stale = stale or state[AXIS_UNCHANGED + i] >= AXIS_STRETCHES * stretch
         state[AXIS_LEAST + i] = state[AXIS_MOST + i] = state[AXIS_EXPECTED + i]
     return stale
