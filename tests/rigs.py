@@ -102,7 +102,7 @@ class ScriptedRig:
 
 class HeldForceRig:
     """Like hardware it keeps the last force it was given. Its driver can be made to hang and to fail. A hand holds it
-    that trembles along y by the encoders' resolution: one that stood still under such forces would be stale."""
+    that trembles along y and z by the encoders' resolution: one that stood still under such forces would be stale."""
 
     def __init__(self) -> None:
         self.drops_force_after_s = 0.1
@@ -122,7 +122,7 @@ class HeldForceRig:
             self.before_sensing()
         self.sense_calls += 1
         reading = np.zeros(READING_SIZE)
-        reading[1] = 1e-5 * (self.sense_calls % 2)
+        reading[1:3] = 1e-5 * (self.sense_calls % 2)
         return reading
 
     def buttons(self) -> frozenset[int]:

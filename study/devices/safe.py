@@ -34,8 +34,8 @@ VIRTUAL_BLOCK_S = 5.0
 """Largest block of ticks that virtual time runs at once (s)."""
 
 NOT_CLOSED = (
-    "the device did not answer when it was closed: it got zero force, and its brakes may be off; what was measured is "
-    "saved; switch it off before a hand touches the handle, and on again before the next session"
+    "the device did not say that it brakes when it was closed: it got zero force, and its brakes may be off; what was "
+    "measured is saved; switch it off before a hand touches the handle, and on again before the next session"
 )
 """Written to stderr where the device did not confirm that it was closed."""
 

@@ -235,9 +235,10 @@ def _steps(last: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.
 
 
 def _follows(last: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
-    """(n,): whether each packet may be of the same clock as the one before and later."""
+    """(n,): whether each packet may be of the same clock as the one before and later. The one before may have been
+    stamped late, by less than a period: of two in a row nothing but the order of their times is known."""
     steps, times = _steps(last, packets)
-    return (steps > 0) & (steps < 2**15) & (times >= SHORTEST_PERIOD_US * steps) & (times < LONGEST_SILENCE_US)
+    return (steps > 0) & (steps < 2**15) & (times > SHORTEST_PERIOD_US * (steps - 1)) & (times < LONGEST_SILENCE_US)
 
 
 def _is_repeat(last: Packets | None, packet: Packets) -> bool:

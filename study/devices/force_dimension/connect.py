@@ -75,10 +75,11 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
         handle.limit_force(cap_n)
         handle.compensate_gravity(effector_mass_kg if effector_mass_kg is not None else model.effector_mass_kg)
         handle.enable_force()
-        if not handle.status().force_on:
+        status = handle.status()
+        if not status.gives_forces:
             raise DeviceError(
                 f"The {model.name} takes no forces",
-                f"It was told to, and stays off: {handle.status().why_off}.",
+                f"It was told to, and stays off: {status.why_off}.",
                 "Check that its power supply is on, and press its force button if it has one.",
             )
     except LibraryError as error:

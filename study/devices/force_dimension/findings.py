@@ -23,6 +23,8 @@ AT_REST_S = 0.3
 """Time (s) for which the handle is left to itself, gravity compensated, before its speed is read."""
 EVERY_S = 0.002
 """Interval (s) of the zero forces sent meanwhile, shorter than the device's watchdog."""
+COMPARED_S = 0.02
+"""After that time, over so long the velocity is told from the positions (s): as the library does it."""
 DRIFTING_MPS = 0.02
 """After `AT_REST_S` with gravity compensated and no hand: 7 % of g in excess of friction. Below, friction holds it."""
 
@@ -127,7 +129,7 @@ def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[Dev
     drops_after_s = make_ready(handle, model, CAP_N, lab.effector_mass_kg)
     took_s = check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
     watchdog = f"set to {1000 * drops_after_s:.1f} ms; without forces the device let go within {1000 * took_s:.0f} ms"
-    return [*findings, DeviceFinding("Watchdog", watchdog, fine=True), _masses(model, lab), _gravity(handle)]
+    return [*findings, DeviceFinding("Watchdog", watchdog, fine=True), _masses(model, lab), *_gravity(handle)]
 
 
 def _masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
@@ -137,13 +139,36 @@ def _masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
     return DeviceFinding("Masses", f"gravity compensation {carried}, spring {moved} ({lab_file()})", fine=True)
 
 
-def _gravity(handle: Handle) -> DeviceFinding:
-    """Raises `LibraryError`."""
-    until_s = time.monotonic() + AT_REST_S
+def _gravity(handle: Handle) -> list[DeviceFinding]:
+    """Drift of the handle by its positions, and whether the library's velocity is that; nothing where the positions
+    cannot be read, as another line of the check says. Raises `LibraryError`."""
+    _rest(handle, AT_REST_S)
+    try:
+        began_s, from_m = time.monotonic(), handle.position_m()[2]
+        _rest(handle, COMPARED_S)
+        up_mps = (handle.position_m()[2] - from_m) / (time.monotonic() - began_s)
+    except LibraryError as error:
+        if error.function == "dhdGetPosition":
+            return []
+        raise
+    told_mps = handle.velocity_mps()[2]
+    findings = [_drift(up_mps)]
+    if not abs(told_mps - up_mps) <= DRIFTING_MPS + 0.5 * abs(up_mps):
+        value = f"the library says {told_mps:g} m/s along z; by its positions the handle moves at {up_mps:.2g} m/s"
+        advice = "Nothing that hapteq plays depends on it. Other programs may: install the vendor's newest SDK."
+        findings.append(DeviceFinding("Velocity", value, fine=False, advice=advice, warning=True))
+    return findings
+
+
+def _rest(handle: Handle, seconds: float) -> None:
+    """Zero forces, in which alone the library compensates gravity. Raises `LibraryError`."""
+    until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
         handle.set_force(0.0, 0.0, 0.0)
         time.sleep(EVERY_S)
-    up_mps = handle.velocity_mps()[2]
+
+
+def _drift(up_mps: float) -> DeviceFinding:
     if abs(up_mps) <= DRIFTING_MPS:
         return DeviceFinding("Gravity", "compensated: the handle stays where it is", fine=True)
     sinks = up_mps < 0

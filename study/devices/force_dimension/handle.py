@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import time
 from ctypes import byref, c_double, c_int, c_ubyte, c_ushort
 from dataclasses import dataclass
 
@@ -19,10 +20,10 @@ STATUS_SIZE = 32
 NO_SERIAL = 0xFFFF
 """No device's serial number."""
 
-POWERED_PLACE, CALIBRATED_PLACE, FORCE_ON_PLACE, OFF_CAUSE_PLACE = 0, 3, 5, 14
+POWERED_PLACE, CALIBRATED_PLACE, FORCE_ON_PLACE, BRAKING_PLACE, OFF_CAUSE_PLACE = 0, 3, 5, 6, 14
 """Indices in the library's status array."""
 
-UNPOWERED_CAUSE, UNCALIBRATED_CAUSE = 101, 102
+UNPOWERED_CAUSE, UNCALIBRATED_CAUSE, BRAKED_CAUSE = 101, 102, 103
 """Causes of our own: the library states them in other places of the status, and that its forces are on."""
 OFF_CAUSES = {
     1: "a button of the device was pressed",
@@ -33,13 +34,16 @@ OFF_CAUSES = {
     6: "the hand was not on the handle (dead-man's switch)",
     UNPOWERED_CAUSE: "its power supply is off",
     UNCALIBRATED_CAUSE: "it does not know its place any more, and needs to be calibrated",
+    BRAKED_CAUSE: "its brakes are on",
 }
-"""Words for the library's codes of why the forces are off, and for the two of our own."""
+"""Words for the library's codes of why the forces are off, and for those of our own."""
 WATCHDOG_CAUSE = 3
 """The library's code for forces that the device's watchdog switched off."""
 
 TRIES = 3
 """Attempts to stop a device whose connection fails."""
+BRAKED_S = 0.02
+"""Longest wait, after each, for the device to say that it brakes (s): its status may be some transfers old."""
 
 
 def why_off(cause: int) -> str:
@@ -60,8 +64,13 @@ class Status:
 
     @property
     def why_off(self) -> str:
-        """`off_cause` in words."""
-        return why_off(self.off_cause)
+        """In words; brakes that are on while the device says that its forces are, are a cause of their own."""
+        return why_off(BRAKED_CAUSE if self.force_on and self.braking else self.off_cause)
+
+    @property
+    def gives_forces(self) -> bool:
+        """Whether forces reach the handle."""
+        return self.force_on and not self.braking
 
 
 class Handle:
@@ -104,7 +113,7 @@ class Handle:
             powered=bool(values[POWERED_PLACE]),
             calibrated=bool(values[CALIBRATED_PLACE]),
             force_on=bool(values[FORCE_ON_PLACE]),
-            braking=bool(values[6]),
+            braking=bool(values[BRAKING_PLACE]),
             off_cause=int(values[OFF_CAUSE_PLACE]),
         )
 
@@ -167,7 +176,8 @@ class Handle:
         self.library.call("dhdWaitForReset", round(1000 * patience_s), self.number)
 
     def let_go(self) -> bool:
-        """Zero force, brakes, disconnect. Whether the device took it. Never raises; may be called again."""
+        """Zero force, brakes, disconnect. Whether the device took it and says so. Never raises; may be called
+        again."""
         if not self._open:
             return True
         stopped = any(self._stop_once() for _ in range(TRIES))
@@ -183,6 +193,15 @@ class Handle:
             self.library.call("dhdSetBrakes", 1, self.number)
         try:
             self.library.call("dhdStop", self.number)
+            return self._is_braked()
         except LibraryError:
             return False
+
+    def _is_braked(self) -> bool:
+        """Whether the device says so, within `BRAKED_S`. Raises `LibraryError`."""
+        until_s = time.monotonic() + BRAKED_S
+        while (status := self.status()).force_on or not status.braking:
+            if time.monotonic() > until_s:
+                return False
+            time.sleep(BRAKED_S / 10)
         return True

@@ -21,6 +21,13 @@ OLDEST_SDK = (3, 16, 0)
 GEOMETRY_ERROR, DEVICE_IN_USE = 8, 20
 """Error codes of the library on which a decision depends."""
 
+HIGHEST_NOTICE = 2
+"""Answers from 1 to this tell something beside success (`handle.STALE`, `handle.SCALED`). What a higher one means is
+not known, so it is an error."""
+
+ANSWER_A_NUMBER = ("dhdOpenID", "dhdGetSystemType")
+"""Functions whose answer, where it is not negative, is what was asked for."""
+
 _ID, _NUMBER, _NUMBERS = c_byte, c_double, POINTER(c_double)
 _THREE = (_NUMBERS, _NUMBERS, _NUMBERS, _ID)
 """Arguments of functions that give a vector: x, y, z, device."""
@@ -102,14 +109,17 @@ class Library:
         return self._functions[name]
 
     def check_answer(self, name: str, answer: int) -> int:
-        """The answer. Raises `LibraryError` where it is below zero; to be asked in the thread of the call."""
-        if answer >= 0:
+        """The answer. Raises `LibraryError` where it is below zero, or unknown; to be asked in the thread of the
+        call."""
+        if 0 <= answer <= HIGHEST_NOTICE or (answer > 0 and name in ANSWER_A_NUMBER):
             return answer
         raise self.last_error(name)
 
     def last_error(self, name: str) -> LibraryError:
         """The error of this function, whose call just failed in this thread."""
         code = int(self._functions["dhdErrorGetLast"]())
+        if code == 0:
+            return LibraryError(name, code, "an answer that is neither success nor a known error")
         text = self._functions["dhdErrorGetLastStr"]() or b"no reason given"
         return LibraryError(name, code, text.decode("utf-8", "replace"))
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.force_dimension.handle import (
+    BRAKED_CAUSE,
+    BRAKING_PLACE,
     CALIBRATED_PLACE,
     FORCE_ON_PLACE,
     OFF_CAUSE_PLACE,
@@ -14,7 +16,9 @@ from study.devices.force_dimension.handle import (
     UNPOWERED_CAUSE,
     WATCHDOG_CAUSE,
 )
+from study.devices.force_dimension.library import HIGHEST_NOTICE
 from study.devices.governor.compiling import part
+from study.devices.governor.confine import is_bounded
 from study.devices.native import SYSTEM_SIZE, Addresses, call_int, room_for_16, word
 
 ODD_FOR, ODD_SHARE = 5, 0.1
@@ -29,6 +33,8 @@ REMEMBERED, LEAST_WEIGHT = 200.0, 20.0
 many it takes."""
 GAIN_ERRORS = 5.0
 """Standard errors by which the gain must be further from 1 than `ODD_PART`."""
+IMPLAUSIBLE_N = 1e6
+"""Reported force along an axis (N) from which it is treated like NaN."""
 FINEST_N = 0.002
 """Resolution that no report is taken to be finer than (N)."""
 
@@ -73,6 +79,12 @@ OF_LIBRARY = 1
 
 
 @part
+def succeeded(answer: int) -> bool:
+    """Whether an answer of the vendor's library is success, with or without a notice."""
+    return bool(0 <= answer <= HIGHEST_NOTICE)
+
+
+@part
 def record_failure(cells: FloatArray, code: int) -> int:
     """Keep the first failure; return `code`."""
     if cells[FAILED] == 0.0:
@@ -103,7 +115,7 @@ def check_on(calls: Addresses, cells: FloatArray) -> int:
     """0 where the device takes forces, -1 where its watchdog has switched them off after a zero; else an error code,
     and OFF_CAUSE holds the cause."""
     status = room_for_16()
-    if call_int(calls[STATUS], (status, np.int32(cells[NUMBER]))) < 0:
+    if not succeeded(call_int(calls[STATUS], (status, np.int32(cells[NUMBER])))):
         return record_library_failure(cells, STATUS)
     cause, on = _number_at(status, OFF_CAUSE_PLACE), _number_at(status, FORCE_ON_PLACE) != 0
     if on or cause == 0:
@@ -111,6 +123,8 @@ def check_on(calls: Addresses, cells: FloatArray) -> int:
             cause = UNPOWERED_CAUSE
         elif _number_at(status, CALIBRATED_PLACE) == 0:
             cause = UNCALIBRATED_CAUSE
+        elif on and _number_at(status, BRAKING_PLACE) != 0:
+            cause = BRAKED_CAUSE
         elif on:
             return 0
     if cells[SENT_ZERO] != 0.0 and cause == WATCHDOG_CAUSE:
@@ -208,15 +222,17 @@ def _reports_forces(cells: FloatArray) -> bool:
 @part
 def _check_given(calls: Addresses, cells: FloatArray) -> int:
     """Compare the reported force with those sent. A device that never reports a force is not judged by it: its
-    acceptance was refused."""
+    acceptance was refused. One that has reported forces, and fails to, is at fault."""
     place = cells.ctypes.data + 8 * REPORTED
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
-    if call_int(calls[GIVEN], asked) < 0:
-        return 0
+    if not succeeded(call_int(calls[GIVEN], asked)):
+        return record_library_failure(cells, GIVEN) if cells[REPORTS] >= ODD_FOR else 0
     if not _reports_forces(cells):
         return 0
-    _add_to_sums(cells)
-    cells[ODD] = count_beyond_share(cells[ODD], _gives_another(cells), ODD_SHARE)
+    bounded = is_bounded(cells[REPORTED : REPORTED + 3], IMPLAUSIBLE_N)
+    if bounded:  # else the sums would be no numbers from now on, and the gain never judged again
+        _add_to_sums(cells)
+    cells[ODD] = count_beyond_share(cells[ODD], not bounded or _gives_another(cells), ODD_SHARE)
     odd = cells[ODD] >= ODD_FOR * (1.0 - ODD_SHARE) or _gain_is_off(cells)
     return record_failure(cells, GIVES_ANOTHER) if odd else 0
 
@@ -240,8 +256,7 @@ def check_still(calls: Addresses, cells: FloatArray) -> int:
     force all the same, again and again."""
     place = cells.ctypes.data + 8 * REPORTED_AT_REST
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
-    reported = (
-        call_int(calls[GIVEN], asked) >= 0 and math.hypot(cells[REPORTED_AT_REST], cells[REPORTED_AT_REST + 1]) > ODD_N
-    )
+    told = succeeded(call_int(calls[GIVEN], asked))
+    reported = told and not math.hypot(cells[REPORTED_AT_REST], cells[REPORTED_AT_REST + 1]) <= ODD_N
     cells[ODD_AT_REST] = cells[ODD_AT_REST] + 1.0 if reported else 0.0
     return 0 if cells[ODD_AT_REST] < ODD_FOR else record_failure(cells, GIVES_ANOTHER)

@@ -15,7 +15,7 @@ from numba import njit, types
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.newest_sample import CLIPPED, COUNT, FRESH_S, REST, ROWS, SENSED, TAKEN_S
 from study.devices.drive.compiled_drive import CALLS, SENSE_SIGNATURE, WRITE_SIGNATURE
-from study.devices.force_dimension.handle import SCALED, STALE
+from study.devices.force_dimension.handle import STALE
 from study.devices.force_dimension.loop_cells import (
     BRAKES,
     CAP_N,
@@ -48,6 +48,7 @@ from study.devices.force_dimension.loop_cells import (
     note_sent,
     record_failure,
     record_library_failure,
+    succeeded,
 )
 from study.devices.governor.compiling import fingerprint, part
 from study.devices.governor.govern import VECTOR
@@ -63,7 +64,8 @@ STALE_FOR, STALE_SHARE = 50, 0.5
 force. At 1 kHz half of what counts as a lost loop."""
 
 SCALED_FOR, SCALED_SHARE = 5, 0.02
-"""The same of forces that the device cannot give in full: what a participant feels is then not what is written down.
+"""The same of forces that are answered with a notice, because the device cannot give them in full: what a participant
+feels is then not what is written down.
 A force whose peaks alone are scaled is so only for some milliseconds in a row, again and again."""
 
 ROUNDING = 1 + 1e-9
@@ -101,7 +103,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     place = reading.ctypes.data
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
     answer = call_int(calls[POSITION], asked)
-    if answer < 0:
+    if not succeeded(answer):
         return record_library_failure(cells, POSITION)
     if cells[READS] % LOOKS_OF in LOOKS_AT:
         code = check_status(calls, cells)
@@ -138,14 +140,14 @@ def _wake_device(calls: Addresses, cells: FloatArray) -> int:
     if cells[CLOSED] != 0.0:
         return record_failure(cells, IS_CLOSED)
     number = np.int32(cells[NUMBER])
-    if call_int(calls[BRAKES], (np.int32(0), number)) < 0:
+    if not succeeded(call_int(calls[BRAKES], (np.int32(0), number))):
         return record_library_failure(cells, BRAKES)
-    if cells[CLOSED] == 0.0 and call_int(calls[ENABLE], (np.int32(1), number)) < 0:
+    if cells[CLOSED] == 0.0 and not succeeded(call_int(calls[ENABLE], (np.int32(1), number))):
         return record_library_failure(cells, ENABLE)
     if cells[CLOSED] != 0.0:  # the call hung while the device was closed: it is taken back
         _brake(calls, cells)
         return record_failure(cells, IS_CLOSED)
-    return 0 if _set_force(calls, cells, 0.0, 0.0, 0.0) >= 0 else record_library_failure(cells, FORCE)
+    return 0 if succeeded(_set_force(calls, cells, 0.0, 0.0, 0.0)) else record_library_failure(cells, FORCE)
 
 
 @part
@@ -166,12 +168,12 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     x, y, z = force[0], force[1], force[2]
     began_s = now_s(calls)  # the device counts from when it got the force, which may be long before the call ends
     answer = _set_force(calls, cells, x, y, z)
-    if answer < 0:
+    if not succeeded(answer):
         return record_library_failure(cells, FORCE)
     cells[SENT_S] = began_s
     note_sent(cells, x, y, z)
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
-    cells[TOO_STRONG] = count_beyond_share(cells[TOO_STRONG], answer == SCALED, SCALED_SHARE)
+    cells[TOO_STRONG] = count_beyond_share(cells[TOO_STRONG], answer != 0, SCALED_SHARE)
     if cells[TOO_STRONG] >= SCALED_FOR * (1.0 - SCALED_SHARE):
         return record_failure(cells, WEAK)
     return 0
@@ -179,9 +181,9 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 
 @part
 def _send_zero(calls: Addresses, cells: FloatArray) -> int:
-    """Send a zero force; brake where the library answers anything but success or a notice (STALE, SCALED)."""
+    """Send a zero force; brake where the library answers anything but success or a notice."""
     began_s = now_s(calls)
-    if not 0 <= _set_force(calls, cells, 0.0, 0.0, 0.0) <= SCALED:
+    if not succeeded(_set_force(calls, cells, 0.0, 0.0, 0.0)):
         code = record_library_failure(cells, FORCE)
         _brake(calls, cells)  # the device may give the force before still
         return code

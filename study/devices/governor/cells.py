@@ -7,10 +7,10 @@ import numpy as np
     STIMULUS_CAP, FEEDBACK_CAP, TOTAL_CAP, SLEW_STEP, WATCHDOG_TICKS, LET_GO_TICKS,
     # What a reading may be: see `protocols.definition.plausibility`.
     WORKSPACE, LONGEST_JUMP, FASTEST_STEP, ACCELERATION, ACCELERATION_SHARE, RESOLUTION, FRICTION,
-    STALE_TICKS, EASE_TICKS, SETTINGS_SIZE,
-) = range(23)  # fmt: skip
+    STALE_TICKS, EASE_TICKS, PASSED_SHARE, SETTINGS_SIZE,
+) = range(24)  # fmt: skip
 """Cells of `settings`, fixed from opening to closing. SLEW_STEP in N per tick, FASTEST_STEP in m per tick,
-LET_GO_TICKS >= 1; VELOCITY_SHARE and ACCELERATION_SHARE: how far a low-pass goes in one tick."""
+LET_GO_TICKS >= 1; VELOCITY_SHARE, ACCELERATION_SHARE and PASSED_SHARE: how far a low-pass goes in one tick."""
 
 (
     # Letter box: written from Python at any time, even in the middle of a block.
@@ -36,8 +36,13 @@ LET_GO_TICKS >= 1; VELOCITY_SHARE and ACCELERATION_SHARE: how far a low-pass goe
     # LAST_STEP in m per tick; where the reading last changed; the motion that is expected meanwhile, m.
     LAST_STEP, _SY, _SZ, CHANGED, _CY, _CZ, MOVING_FORCE, _MY, _MZ, EXPECTED, _DY, _DZ, EXPECTED_SPEED, _UY, _UZ,
     LEAST, _AY, _AZ, MOST, _BY, _BZ,
+    # The same of each axis by itself; ticks since its reading changed.
+    AXIS_CHANGED, _A1, _A2, AXIS_FORCE, _A3, _A4, AXIS_EXPECTED, _A5, _A6, AXIS_SPEED, _A7, _A8,
+    AXIS_LEAST, _A9, _A10, AXIS_MOST, _A11, _A12, AXIS_UNCHANGED, _A13, _A14,
+    # The stimulus after the first low-pass and after the second, N.
+    PASSED, _P1, _P2, PASSED_TWICE, _P3, _P4,
     STATE_SIZE,
-) = range(79)  # fmt: skip
+) = range(106)  # fmt: skip
 """Cells of `state`."""
 
 STILL, PLAYING, RELEASING, LETTING_GO = range(4)

@@ -10,6 +10,13 @@ from equalizer.signals.signal import FloatArray
 from study.devices.governor.cells import (
     ACCELERATION,
     ACCELERATION_SHARE,
+    AXIS_CHANGED,
+    AXIS_EXPECTED,
+    AXIS_FORCE,
+    AXIS_LEAST,
+    AXIS_MOST,
+    AXIS_SPEED,
+    AXIS_UNCHANGED,
     CHANGED,
     EASED,
     EASED_BEFORE,
@@ -29,6 +36,9 @@ from study.devices.governor.cells import (
     NO_FAULT,
     NOT_A_NUMBER,
     OUTSIDE,
+    PASSED,
+    PASSED_SHARE,
+    PASSED_TWICE,
     PULL,
     RESOLUTION,
     SHAKEN,
@@ -49,6 +59,14 @@ GRIPPED_KG, GRIPPED_N_S_PER_M, GRIPPED_N_PER_M = 1.0, 60.0, 3000.0
 """A handle in a hard grip moves no less than this. A whole arm has 0.55 kg, 6.5 N s/m, 135 N/m (Sci. Rep. srep18004),
 a hard grip some 20 times that stiffness."""
 
+AXIS_TIMES, AXIS_STRETCHES = 4.0, 2
+"""An axis by itself is looked at in stretches of so many times what makes the whole position stale, and must have been
+expected to move in each of so many in a row: while the others move, the linkage's friction holds an axis for longer."""
+
+MOVING_BELOW_HZ = 80.0
+"""Corner of the two low-passes before the expected motion. Faster forces move a gripped handle by less than a step of
+the resolution; dry friction, computed at the rate of the loop, would make a drift of them that no handle follows."""
+
 STEPS_OF_RESOLUTION = 2.0
 """Between the differences of three readings that are each wrong by half a step; and so far must a handle be expected
 to have moved, before a reading that did not change is stale."""
@@ -59,9 +77,12 @@ def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
     """Update the motion expected of the gripped handle in the last tick, by the stimulus: a hand at rest has held
     before what it holds now. Dry friction passes only the part of a force that exceeds the last one that moved the
     handle (Prandtl's play operator)."""
-    x = state[EXCITATION] - state[MOVING_FORCE]
-    y = state[EXCITATION + 1] - state[MOVING_FORCE + 1]
-    z = state[EXCITATION + 2] - state[MOVING_FORCE + 2]
+    for i in range(3):
+        state[PASSED + i] += settings[PASSED_SHARE] * (state[EXCITATION + i] - state[PASSED + i])
+        state[PASSED_TWICE + i] += settings[PASSED_SHARE] * (state[PASSED + i] - state[PASSED_TWICE + i])
+    x = state[PASSED_TWICE] - state[MOVING_FORCE]
+    y = state[PASSED_TWICE + 1] - state[MOVING_FORCE + 1]
+    z = state[PASSED_TWICE + 2] - state[MOVING_FORCE + 2]
     beyond = norm_of(x, y, z)
     share = 1.0 - settings[FRICTION] / beyond if beyond > settings[FRICTION] else 0.0
     state[MOVING_FORCE] += share * x
@@ -98,7 +119,6 @@ def _gave_way(state: FloatArray, settings: FloatArray, way: float) -> bool:
 
 @part
 def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
-    _expect_motion(state, settings)
     if _has_changed(state, settings, reading):
         state[UNCHANGED] = 0.0
         return False
@@ -106,6 +126,40 @@ def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> b
     expected = max(state[MOST] - state[LEAST], state[MOST + 1] - state[LEAST + 1], state[MOST + 2] - state[LEAST + 2])
     way = STEPS_OF_RESOLUTION * settings[RESOLUTION]
     return bool(state[UNCHANGED] >= settings[STALE_TICKS] and (expected > way or _gave_way(state, settings, way)))
+
+
+@part
+def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
+    """As `_expect_motion`, for an axis by itself: its share of the force must exceed the friction alone."""
+    beyond = state[PASSED_TWICE + i] - state[AXIS_FORCE + i]
+    if abs(beyond) > settings[FRICTION]:
+        state[AXIS_FORCE + i] += beyond - math.copysign(settings[FRICTION], beyond)
+    left = state[AXIS_FORCE + i] - GRIPPED_N_PER_M * state[AXIS_EXPECTED + i]
+    left -= GRIPPED_N_S_PER_M * state[AXIS_SPEED + i]
+    state[AXIS_SPEED + i] += settings[TICK_S] / GRIPPED_KG * left
+    state[AXIS_EXPECTED + i] += settings[TICK_S] * state[AXIS_SPEED + i]
+    state[AXIS_LEAST + i] = min(state[AXIS_LEAST + i], state[AXIS_EXPECTED + i])
+    state[AXIS_MOST + i] = max(state[AXIS_MOST + i], state[AXIS_EXPECTED + i])
+
+
+@part
+def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
+    """Whether an axis has not changed although its share of the force must have moved it, while the others move on."""
+    stale, stretch, half = False, AXIS_TIMES * settings[STALE_TICKS], 0.5 * settings[RESOLUTION]
+    for i in range(3):
+        _expect_along_axis(state, settings, i)
+        if abs(reading[i] - state[AXIS_CHANGED + i]) >= half:
+            state[AXIS_CHANGED + i], state[AXIS_UNCHANGED + i] = reading[i], 0.0
+            state[AXIS_LEAST + i] = state[AXIS_MOST + i] = state[AXIS_EXPECTED + i]
+            continue
+        state[AXIS_UNCHANGED + i] += 1.0
+        if state[AXIS_UNCHANGED + i] % stretch != 0.0:
+            continue
+        if state[AXIS_MOST + i] - state[AXIS_LEAST + i] <= STEPS_OF_RESOLUTION * settings[RESOLUTION]:
+            state[AXIS_UNCHANGED + i] = 0.0
+        stale = stale or state[AXIS_UNCHANGED + i] >= AXIS_STRETCHES * stretch
+        state[AXIS_LEAST + i] = state[AXIS_MOST + i] = state[AXIS_EXPECTED + i]
+    return stale
 
 
 @part
@@ -131,6 +185,8 @@ def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArra
     last_x = state[LAST_POSITION]
     if math.isnan(last_x):  # the first reading
         _has_changed(state, settings, reading)
+        for i in range(3):
+            state[AXIS_CHANGED + i] = reading[i]
         return NO_FAULT
     x, y, z = reading[0] - last_x, reading[1] - state[LAST_POSITION + 1], reading[2] - state[LAST_POSITION + 2]
     # Driver and loop have clocks of their own: readings may be a tick apart, though they were taken one after another.
@@ -140,4 +196,6 @@ def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArra
         return JUMPED
     if _is_shaken(state, settings, x / ticks, y / ticks, z / ticks):
         return SHAKEN
-    return STALE if _is_stale(state, settings, reading) else NO_FAULT
+    _expect_motion(state, settings)
+    axis_stale = _is_axis_stale(state, settings, reading)
+    return STALE if _is_stale(state, settings, reading) or axis_stale else NO_FAULT

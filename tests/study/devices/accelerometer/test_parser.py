@@ -221,6 +221,19 @@ def test_packets_that_were_stamped_late_count(late_us):
     assert (parser.counts.lost, parser.counts.spoiled_bytes, parser.counts.restarts) == (0, 0, 0)
 
 
+@pytest.mark.parametrize(("period_us", "late_us"), [(250, 205), (250, 249), (100, 99), (500, 499)])
+def test_packets_that_were_stamped_just_before_the_next_count(period_us, late_us):
+    """Late by all but 1 to 45 µs of a period, one in ten, some of them in a row."""
+    rng = np.random.default_rng(late_us)
+    numbers = np.arange(5000)
+    times = period_us * numbers + late_us * (rng.random(len(numbers)) < 0.1)
+    data = encode_packets(numbers, times, rng.integers(0, 2**16, (len(numbers), 3), dtype=np.uint16))
+    parser = PacketParser()
+    samples = [parser.feed(data[at : at + 200]) for at in range(0, len(data), 200)]
+    assert np.concatenate([each.sequence for each in samples]).tolist() == numbers.tolist()
+    assert (parser.counts.lost, parser.counts.spoiled_bytes, parser.counts.restarts) == (0, 0, 0)
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_packets_that_come_again_or_lie_are_told_apart_among_garbled_ones(seed):
     """Repeats, old ones sent again, ones from the near future and from anywhere, two in a row as well."""

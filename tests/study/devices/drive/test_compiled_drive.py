@@ -127,7 +127,8 @@ def tremble(calls, own, samples, reading):
     own[READINGS] += 1.0
     for i in range(READING_SIZE):
         reading[i] = 0.0
-    reading[0] = 1e-3 * np.sin(0.05 * own[READINGS])
+    for i in range(3):
+        reading[i] = 1e-3 * np.sin(0.05 * own[READINGS])
     return 7 if own[READINGS] == own[FAILS_AT] else 0
 
 

@@ -32,6 +32,7 @@
   X(off_by, 0) X(reset_after_s, 0) X(stretch_in_use, 1)                                                                \
   /* Faults that come and go: 0 = always; else only each so many-th reading or force. */                               \
   X(jump_every, 0) X(scaled_every, 0) X(frozen_axis, 0) X(write_late_every, 0) X(write_late_s, 0) X(status_late_s, 0) X(cap_works, 1) X(gain_told, 1)                   \
+  X(stop_ignored, 0) X(told_speed, 1) X(told_bias, 0) /* the velocity told is so many times the true one, and offset, m/s */ X(silent_bias, 0) /* force along x on top, N */ X(brakes_told, 0) /* dhdStop answered and not done; brakes on, and force on, as it says */ X(told_nan, 0) /* reports to come that are NaN */ \
   X(answer_of_errors, -1) /* of functions that fail */ X(keeps_force, 0) /* a zero is answered and not given */                               \
   X(silent_gain, 1) X(told_step, 0) X(told_noise, 0) X(told_lift, 0) /* scaled without a word; the reported force in steps, with noise (rms), N; its weight held up */ \
   X(silently_n, 1e9) /* a cap of its own, of which no answer says anything */ X(turned, 0) /* force the other way */                                                                  \
@@ -156,7 +157,7 @@ static void step(double dt) {
     drop(3);
   if (p[off_by]) drop((int)p[off_by]);
   for (int i = 0; i < 3; i++) {
-    double applied = p[force_on] && !p[brake] ? command[i] : 0;
+    double applied = p[force_on] && !p[brake] ? command[i] + (i ? 0 : p[silent_bias]) : 0;
     double lift = p[gravity] && p[force_on] ? 9.81 * p[effector] : 0, down = i == 2 && p[weight] > 0 ? p[weight] - lift : 0;
     double rate = 2 * 3.14159265358979 * p[mode_hz], pull = p[mode_kg] * (rate * rate * (w[i] - x[i]) + 0.08 * rate * (u[i] - v[i]));
     double force = p[gain] * applied - (p[damping] + (p[brake] ? 20 : 0)) * v[i] - p[stiffness] * x[i] - down;
@@ -294,7 +295,7 @@ EXPORT int dhdOpenID(char id) {
 EXPORT int dhdClose(char id) { (void)id; PLAIN(p[opened] = 0; p[closes]++; drop(4)); }
 EXPORT int dhdStop(char id) {
   (void)id;
-  PLAIN(if (p[stop_fails] > 0) { p[stop_fails]--; code = fail(COM); } else {
+  PLAIN(if (p[stop_fails] > 0) { p[stop_fails]--; code = fail(COM); } else if (!p[stop_ignored]) {
     memset(command, 0, sizeof command), p[stops]++, drop(4); });
 }
 EXPORT int dhdGetSystemType(char id) { (void)id; int code = begin(); return end(code ? code : (int)p[type]); }
@@ -306,7 +307,7 @@ EXPORT int dhdGetStatus(int *status, char id) {
   if (p[untold] == 1) PLAIN((void)0);
   PLAIN(memset(status, 0, 17 * sizeof(int)); status[0] = p[powered] != 0; status[1] = status[2] = 1;
         status[3] = p[calibrated] != 0; status[4] = !p[force_on] && !p[brake]; status[5] = p[force_on] != 0;
-        status[6] = p[brake] != 0; status[10] = p[gravity] != 0; status[11] = p[guard] != 0;
+        status[6] = p[brake] != 0 || p[brakes_told] != 0; status[10] = p[gravity] != 0; status[11] = p[guard] != 0;
         status[14] = (int)p[cause]; come_late(1, p[status_late_s] > 0, p[status_late_s]));
 }
 EXPORT int dhdEnableForce(unsigned char value, char id) {
@@ -339,7 +340,8 @@ EXPORT int dhdGetPosition(double *px, double *py, double *pz, char id) {
 }
 EXPORT int dhdGetLinearVelocity(double *vx, double *vy, double *vz, char id) {
   (void)id;
-  PLAIN(*vx = v[0]; *vy = v[1]; *vz = v[2]);
+  double k = p[told_speed], off = p[told_bias];
+  PLAIN(*vx = k * v[0] + off; *vy = k * v[1] + off; *vz = k * v[2] + off);
 }
 EXPORT int dhdSetForce(double x_n, double y_n, double z_n, char id) {
   (void)id;
@@ -370,7 +372,7 @@ EXPORT int dhdGetForce(double *x_n, double *y_n, double *z_n, char id) {
   (void)id;
   double *told[3] = {x_n, y_n, z_n}, step = p[told_step];
   if (p[untold] > 1) PLAIN((void)0);
-  PLAIN(for (int i = 0; i < 3; i++) {
+  PLAIN(if (p[told_nan] > 0) { p[told_nan]--; *x_n = *y_n = *z_n = NAN; } else for (int i = 0; i < 3; i++) {
     double said = p[gain_told] * p[fx + i] + (i == 2 ? p[told_lift] : 0) + p[told_noise] * 3.4641016 * evenly();
     *told[i] = step > 0 ? step * round(said / step) : said;
   });

@@ -79,9 +79,27 @@ def test_readings_of_which_most_are_repeated_end_the_trial(stepped_stub, rigs):
 
 @pytest.mark.parametrize("axis", [1, 2, 3])
 def test_an_axis_that_freezes_pulls_no_harder_than_the_feedback_may(stepped_stub, rigs, axis):
-    """The other axes move on, so it is no frozen reading: what it may do is bounded."""
+    """The other axes move on: as long as its share of the force need not have moved it, what it may do is bounded."""
     held_under(stepped_stub, rigs, rigs.sine(2.0), {"frozen_axis": axis})
     assert stepped_stub.get("peak_n") <= 2.0 + rigs.LIMITS.feedback_cap_n
+
+
+@pytest.mark.parametrize("stiffness", [0, 150, 1000])
+@pytest.mark.parametrize(("amplitude_n", "frequency_hz"), [(2.0, 5), (2.0, 25), (3.0, 40)])
+@pytest.mark.parametrize("axis", [2, 3])
+def test_an_axis_that_freezes_is_noticed_where_the_force_along_it_moves_any_hand(
+    stepped_stub, rigs, axis, amplitude_n, frequency_hz, stiffness
+):
+    stepped_stub.set("stiffness", stiffness)
+    stimulus = rigs.sine(amplitude_n, frequency_hz)
+    fault = held_under(stepped_stub, rigs, stimulus, {"frozen_axis": axis}, seconds=1.0)
+    assert fault is Fault.STALE
+
+
+@pytest.mark.parametrize("frequency_hz", [5, 25, 40])
+def test_an_axis_that_stands_still_without_a_force_along_it_is_not_frozen(stepped_stub, rigs, frequency_hz):
+    """Nothing acts along x."""
+    assert held_under(stepped_stub, rigs, rigs.sine(3.0, frequency_hz), {"frozen_axis": 1}) is Fault.NONE
 
 
 @pytest.mark.real_time

@@ -103,7 +103,8 @@ MUTATIONS = {
         feedback, "(elapsed * settings[TICK_S])", "settings[TICK_S]", "",
     ),
     "no check of stale readings": (
-        plausibility, "return STALE if _is_stale(state, settings, reading) else NO_FAULT", "return NO_FAULT", "lie",
+        plausibility, "return STALE if _is_stale(state, settings, reading) or axis_stale else NO_FAULT",
+        "return NO_FAULT", "lie",
     ),
     "no check of jumps": (
         plausibility, "        return JUMPED", "        pass", "lie",

@@ -90,12 +90,19 @@ def test_an_encoder_fault_is_cleared_by_the_next_stimulus(bench, rigs):
     assert bench.health().fault is Fault.NONE
 
 
-@pytest.mark.parametrize("nonsense", [math.nan, math.inf, -math.inf, 0.51, -100.0, 1e308])
-def test_a_position_outside_the_workspace_releases_within_the_release_time(bench, rigs, nonsense):
+@pytest.mark.parametrize(
+    ("place_m", "fault"),
+    [
+        *((value, Fault.NOT_A_NUMBER) for value in (math.nan, math.inf, -math.inf, 0.51, -100.0, 1e308)),
+        *((value, Fault.OUTSIDE) for value in (0.125, -0.125, 0.49)),
+    ],
+)
+def test_a_position_outside_the_workspace_releases_within_the_release_time(bench, rigs, place_m, fault):
+    """What no handle can reach, and what this one does not."""
     bench.hold(rigs.sine(3.0, 45), 408)
-    bench.lean(0.0, nonsense, 0.0)
+    bench.lean(0.0, place_m, 0.0)
     forces = bench.go_on(100)
-    assert bench.health().fault is Fault.NOT_A_NUMBER
+    assert bench.health().fault is fault
     assert not forces[410 + 50 :].any()
     assert rigs.violations(forces, rigs.LIMITS) == []
 

@@ -99,6 +99,15 @@ def test_no_valid_reading_ends_a_trial(rigs):
     assert play_all(rigs, 200_000, seconds=1.0) >= len(FREQUENCIES_HZ) * len(LEVELS_N)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_no_sweep_to_half_the_rate_ends_a_recording(rigs, seed):
+    """Near it the samples of a sine rise and fall slowly, while the handle stands still."""
+    rng = np.random.default_rng(7000 + seed)
+    fault, ran = sweep(rigs, rng, 10.0, float(rng.choice([0.3, 1.0, 2.0, 3.0])))
+    assert fault is Fault.NONE
+    assert ran > 10_000
+
+
 @pytest.mark.slow
 def test_no_valid_reading_ends_a_trial_in_ten_million_ticks(rigs):
     assert play_all(rigs, 10_000_000, seconds=8.0) >= 5 * len(FREQUENCIES_HZ) * len(LEVELS_N)
