@@ -39,6 +39,9 @@ class DeviceInfo:
     """Serial number, firmware, or the simulation's parameter set."""
     has_sensor: bool = True
     """Whether there is an accelerometer: a real device's is named by the lab's file."""
+    moved_by_force: bool = True
+    """False for a replay alone: its position may stand still under any force. Ignored for a device that is not
+    simulated."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -198,6 +198,10 @@ class Governor:
         return round(seconds * self._rate_hz)
 
 
+NEVER_TICKS = 1e15
+"""Ticks that no opening lasts: for a limit that does not hold."""
+
+
 def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
     """The cells of `study.devices.governor.govern` that hold from opening to closing."""
     limits, rate_hz = settings.limits, info.sample_rate_hz
@@ -214,6 +218,8 @@ def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
     packed[cells.WATCHDOG_TICKS] = round(limits.watchdog_s * rate_hz)
     packed[cells.LET_GO_TICKS] = max(1, math.floor(limits.release_s * rate_hz))
     _pack_plausibility(packed, limits.plausibility, rate_hz)
+    if info.simulated and not info.moved_by_force:
+        packed[cells.STALE_TICKS] = NEVER_TICKS
     return packed
 
 

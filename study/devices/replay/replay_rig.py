@@ -99,6 +99,7 @@ def replay_rig(path: Path) -> CompiledRig:
             max_force_n=NOMINAL.max_force_n,
             effective_mass_kg=NOMINAL.effective_mass_kg,
             details=f"{path.name}, {len(readings)} samples; no force changes what is replayed",
+            moved_by_force=False,
         ),
         state=state,
         parameters=np.append(readings.reshape(-1), _noise_mps2(readings[:, ACCELERATION])),

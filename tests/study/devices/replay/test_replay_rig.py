@@ -12,7 +12,9 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.cli.main import main
 from study.devices.clock import VirtualClock
-from study.devices.device import Fault
+from study.devices.device import DeviceInfo, Fault
+from study.devices.governor import cells
+from study.devices.governor.governor import pack_settings
 from study.devices.opening import open_device
 from study.errors import DeviceError
 from study.store.formats.recording_file import read_recording, write_recording
@@ -94,8 +96,10 @@ def test_a_stretch_of_the_whole_recording_plays_without_a_crossfade(rigs, comman
             clock.sleep(0.1)
             device.keep_alive()
         assert device.release().health.ticks > 1500
-        # Longer than there is: the end stays, and the safety layer says what that looks like.
-        assert device.play(rigs.force(commands[0])).health.fault is Fault.STALE
+        # Longer than there is: the end stays.
+        longer = device.play(rigs.force(commands[0]))
+        assert longer.health.fault is Fault.NONE
+        assert np.ptp(longer.recording.position.samples[200:], axis=0).max() == 0.0
 
 
 def test_a_recorded_protocol_recorded_again_is_the_same_recording(tmp_path, capsys):
@@ -118,6 +122,26 @@ def test_a_simulated_participant_takes_a_study_on_a_replayed_device(rigs, file, 
     rows = (tmp_path / "data" / "ideal1_001" / "trials.csv").read_text().splitlines()
     assert len(rows) > 8
     assert not any("void" in row for row in rows[1:])
+
+
+def test_a_recorded_handle_that_rests_under_a_force_is_no_frozen_encoder(rigs, originals, commands, tmp_path):
+    still = originals[1]
+    at_rest = replace(still.position, samples=np.tile(still.position.samples[:1], (len(still), 1)))
+    write_recording(tmp_path / "still.h5", replace(still, position=at_rest))
+    with contextlib.closing(open_device(f"replay:{tmp_path / 'still.h5'}", rigs.SETTINGS, VirtualClock(), 1)) as device:
+        played = device.play(rigs.force(commands[1]))
+        assert played.health.fault is Fault.NONE
+        assert np.ptp(played.recording.position.samples, axis=0).max() == 0.0
+
+
+def test_only_a_simulated_device_may_stand_still_under_a_force(rigs):
+    info = DeviceInfo("replayed", True, 1000.0, 12.0, 0.2, moved_by_force=False)
+    packed = [
+        pack_settings(each, rigs.SETTINGS)[cells.STALE_TICKS]
+        for each in (info, replace(info, simulated=False), replace(info, moved_by_force=True))
+    ]
+    assert packed[0] > 1e12
+    assert packed[1] == packed[2] < 1e4
 
 
 @pytest.mark.real_time
