@@ -90,7 +90,7 @@ def exchange_for_relatives(
     of them it is may be seen only beside the second effect. They start from the whole explanation without the first
     effect, not fitted anew, and only what then leaves less than the first effect does is fitted on."""
     tried = relatives(found.steps[0].newest, catalogue) if found.steps else ()
-    if not tried or not _may_exchange(context, found, time_left):
+    if len(tried) < 2 or not _may_exchange(context, found, time_left):
         return found
     limited, last = replace(context, map_=limit_map(context.map_, time_left)), found.steps[-1]
     sites = found.steps[0].fitted.hypothesis.claims[-1].sites
