@@ -65,14 +65,32 @@ def _lose_positions_as_measured(
     before: FloatArray, after: FloatArray, position: FloatArray, measured: FloatArray
 ) -> FloatArray:
     """Repeats positions where the response repeats, provided that the measured position shows that the same logger read
-    it."""
+    it; then also where only the position tells, because the response hardly changed from one sample to the next."""
     lost = np.any(after != before, axis=1)
     if not lost.any():
         return position
+    held = _repeat_rows(position, lost)
+    if not np.nansum((measured - held)[lost] ** 2) < np.nansum((measured - position)[lost] ** 2):
+        return position
+    return _repeat_rows(position, lost | _is_clearly_repeated(position, measured))
+
+
+def _repeat_rows(position: FloatArray, lost: Flags) -> FloatArray:
     held = np.empty(position.shape)
     repeat_where(np.ascontiguousarray(position), lost, held)
-    better = np.nansum((measured - held)[lost] ** 2) < np.nansum((measured - position)[lost] ** 2)
-    return held if better else position
+    return held
+
+
+def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> Flags:
+    """Where a measured position is far nearer to the one before than to its own, in units of the noise, which most
+    samples show (median absolute deviation)."""
+    error = measured - position
+    noise = 1.4826 * np.nanmedian(np.abs(error), axis=0)
+    step = np.diff(position, axis=0, prepend=position[:1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # The squared distance to the position before, less that to its own.
+        nearer = np.nansum((2 * error * step + step**2) / noise**2, axis=1)
+    return np.asarray(nearer < -(CLEAR**2) / 2)
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
