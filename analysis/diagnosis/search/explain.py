@@ -177,9 +177,11 @@ def _evaluate_again(context: SearchContext, scored: FittedCandidate) -> Fitted:
 
 def is_worth_searching(context: SearchContext, found: Explanation, base: FittedCandidate) -> bool:
     """Whether `base`, the last step of `found`, leaves enough error to look for one more effect. A third is not looked
-    for where two fit as well as laws of a real device do: it would take up what these leave."""
+    for where two fit as well as laws of a real device do: it would take up what these leave. Opened samples are an
+    exception: few among many, they may show what the others do not."""
     if base.fitted.hypothesis.claims:
-        if len(base.fitted.hypothesis.claims) > 1 and context.references is None and leaves_little(found.retuned, base):
+        judged_whole = context.references is None and not context.opened
+        if judged_whole and len(base.fitted.hypothesis.claims) > 1 and leaves_little(found.retuned, base):
             return False
         beyond = 1.0 if context.references is None else context.references.beyond
         return base.score.worst_channel > SEARCH_ON * beyond

@@ -1,4 +1,4 @@
-"""Revises what forward selection found: an effect is removed, or exchanged.
+"""Revises what forward selection found: an effect is exchanged, or dropped (backward elimination).
 
 Forward selection chooses the first effect for what all of them do together, so that it may be a compromise. With the
 second effect held, the first is looked for again; where another one fits better, it takes the first one's place, and
@@ -10,7 +10,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
-from analysis.diagnosis.errors.hypothesis import Hypothesis, without_claim
+import numpy as np
+
+from analysis.diagnosis.errors.hypothesis import Hypothesis, combine, without_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
@@ -20,23 +22,23 @@ from analysis.diagnosis.search.next_effect import (
     find_first_fits,
     find_next_effect,
 )
-from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little, relatives
+from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little, plainest_first, relatives
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
-from analysis.diagnosis.settings import SEARCH_ON
+from analysis.diagnosis.search.verdict import as_good_as_noise, shares_taken, worth_naming
+from analysis.diagnosis.settings import LAST_EFFECT_SHARE, SEARCH_ON
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 
 
 def without_effect(context: SearchContext, found: Explanation, number: int) -> Explanation:
-    """The explanation without one effect; the others are refitted from where they are beside it, which for the last may
-    be a better minimum than they had before. number: of the effect, in the order in which they were found; without the
-    only one, the re-tuned model is left."""
+    """The explanation without one effect; those after it are refitted. number: of the effect, in the order in which
+    they were found; without the only one, the re-tuned model is left."""
     if len(found.steps) == 1:
         return replace(found, after=found.retuned, steps=())
     earlier, later = found.steps[:number], list(found.steps[number + 1 :])
     if not later:
-        return _without_last(context, found)
+        return replace(found, after=context.with_test_score(earlier[-1]), rounds=found.rounds[:number], steps=earlier)
     alone = [_without(context, candidate, number) for candidate in later]
     alone[-1] = context.candidate(refine(context, alone[-1].fitted))
     # Beside effects that follow, rivals of this one were not compared.
@@ -46,18 +48,49 @@ def without_effect(context: SearchContext, found: Explanation, number: int) -> E
     return replace(found, after=context.with_test_score(alone[-1]), rounds=rounds, steps=(*earlier, *alone))
 
 
-def _without_last(context: SearchContext, found: Explanation) -> Explanation:
-    """The explanation as it was before its last effect, or refitted from where that has led."""
-    before, last = found.steps[-2], len(found.steps) - 1
+def without_last_refitted(context: SearchContext, found: Explanation) -> Explanation:
+    """The explanation without the last of several effects, the others refitted from where they are beside it: that may
+    be a better minimum than they had before."""
+    last, before = len(found.steps) - 1, without_effect(context, found, len(found.steps) - 1)
     freed = context.candidate(refine(context, _without(context, found.steps[-1], last).fitted))
-    kept = freed if freed.fitted.cost < before.fitted.cost else before
-    rounds = (*found.rounds[: last - 1], (kept, *found.rounds[last - 1][1:]))
-    return replace(found, after=context.with_test_score(kept), rounds=rounds, steps=(*found.steps[: last - 1], kept))
+    if not freed.fitted.cost < before.steps[-1].fitted.cost:
+        return before
+    # Rivals of the one before it were fitted beside a worse minimum.
+    rounds = (*before.rounds[: last - 1], (freed,))
+    return replace(before, after=context.with_test_score(freed), rounds=rounds, steps=(*before.steps[:-1], freed))
 
 
 def _without(context: SearchContext, candidate: FittedCandidate, number: int) -> FittedCandidate:
     fewer: Hypothesis = without_claim(candidate.fitted.hypothesis, number)
     return context.candidate(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, fewer))
+
+
+def drop_needless(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
+    """Drop the first of the effects without which the others fit as well: an earlier one may have stood in for a later
+    one, and the last may have led the others out of a local minimum. Of three, also the one without which the other two
+    leave least, and as little as laws of a real device do: none is exact, and a third takes up what they leave."""
+    enough, last = [], len(found.steps) - 1
+    for number in range(len(found.steps) if time_left() else 0):
+        others = without_effect(context, found, number) if number < last else without_last_refitted(context, found)
+        if np.isfinite(others.steps[-1].fitted.cost):
+            if not is_worthwhile(others.steps[-1], found.steps[-1]):
+                return others if last < 2 else drop_needless(context, others, time_left)
+            enough += [others] if last > 1 and context.references is None and as_good_as_noise(others) else []
+        if not time_left():
+            break
+    return min(enough, key=lambda others: others.after.score.mean_log_error, default=found)
+
+
+def drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
+    """Drop last effects that take little and leave more than noise."""
+    while len(found.steps) > 1 and not as_good_as_noise(found):
+        if shares_taken(found.retuned, found.steps)[-1] >= LAST_EFFECT_SHARE:
+            break
+        fewer = without_effect(context, found, len(found.steps) - 1)
+        if not worth_naming(fewer):
+            break
+        found = fewer
+    return found
 
 
 def exchange_effects(
@@ -78,9 +111,9 @@ def exchange_effects(
 
 def _find_first_again(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress
-) -> tuple[FittedCandidate, ...]:
+) -> tuple[Explanation, tuple[FittedCandidate, ...]]:
     kept = without_effect(context, found, 0)
-    return find_next_effect(context, catalogue, kept.steps[-1].fitted, _again(progress))
+    return kept, find_next_effect(context, catalogue, kept.steps[-1].fitted, _again(progress))
 
 
 def exchange_for_relatives(
@@ -88,20 +121,33 @@ def exchange_for_relatives(
 ) -> Explanation:
     """The explanation with its first effect exchanged for one of its family, or a refinement, at the same place: which
     of them it is may be seen only beside the second effect. They start from the whole explanation without the first
-    effect, not fitted anew, and only what then leaves less than the first effect does is fitted on."""
+    effect, not fitted anew, and only what then leaves less than the first effect does is fitted on. The first effect
+    is among those that are compared, so that a refinement must gain as much as in any step."""
     tried = relatives(found.steps[0].newest, catalogue) if found.steps else ()
     if len(tried) < 2 or not _may_exchange(context, found, time_left):
         return found
     limited, last = replace(context, map_=limit_map(context.map_, time_left)), found.steps[-1]
     sites = found.steps[0].fitted.hypothesis.claims[-1].sites
 
-    def compare() -> tuple[FittedCandidate, ...]:
+    def compare() -> tuple[Explanation, tuple[FittedCandidate, ...]]:
         base = _without(limited, last, 0).fitted
         evidence = gather_evidence(limited.measure, limited.tuning, base)[0]
         fits = find_first_fits(limited, tried, base, evidence, _again(progress), sites)
-        return compare_plausible(limited, base, [law for law in fits if law.cost < last.fitted.cost], evidence)
+        better = [law for law in fits if law.cost < last.fitted.cost]
+        compared = compare_plausible(limited, base, better, evidence)
+        kept = without_effect(limited, found, 0) if compared else found
+        return kept, plainest_first([*compared, _with_first_at_end(limited, last)])
 
     return _exchange_first(context, found, compare) or found
+
+
+def _with_first_at_end(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
+    """The same fit with its first effect as the last, so that others in its place compare with it."""
+    whole = first = candidate.fitted.hypothesis
+    for number in reversed(range(1, len(whole.claims))):
+        first = without_claim(first, number)
+    turned = combine(without_claim(whole, 0), first)
+    return context.candidate(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, turned))
 
 
 def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBudget) -> bool:
@@ -116,22 +162,24 @@ def _again(progress: Progress) -> Step:
 
 
 def _exchange_first(
-    context: SearchContext, found: Explanation, compare: Callable[[], tuple[FittedCandidate, ...]]
+    context: SearchContext, found: Explanation, compare: Callable[[], tuple[Explanation, tuple[FittedCandidate, ...]]]
 ) -> Explanation | None:
     """The explanation with its first effect replaced by what fits better beside the others; None where nothing does.
-    compare: the candidates in its place, the preferred one first."""
+    compare: the explanation without it, and the candidates in its place, the preferred one first."""
 
-    def find() -> Explanation | None:
+    def find() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
         try:
-            tried = compare()
-            named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
-            if not named or named[0] is not tried[0] or not is_worthwhile(found.steps[-1], named[0]):
-                return None
-            kept = without_effect(context, found, 0)
+            return compare()
         except OutOfTimeError:
             return None
-        # What was compared with the former first effect are no rivals of the one that is first now.
-        rounds = (kept.rounds[0][:1], *kept.rounds[1 : len(kept.steps)], named)
-        return replace(kept, after=context.with_test_score(named[0]), rounds=rounds, steps=(*kept.steps, named[0]))
 
-    return context.guard.part(found.steps[-1].newest, "its exchange", find, None)
+    looked = context.guard.part(found.steps[-1].newest, "its exchange", find, None)
+    if looked is None:
+        return None
+    kept, tried = looked
+    named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
+    if not named or named[0] is not tried[0] or not is_worthwhile(found.steps[-1], named[0]):
+        return None
+    # What was compared with the former first effect are no rivals of the one that is first now.
+    rounds = (kept.rounds[0][:1], *kept.rounds[1 : len(kept.steps)], named)
+    return replace(kept, after=context.with_test_score(named[0]), rounds=rounds, steps=(*kept.steps, named[0]))

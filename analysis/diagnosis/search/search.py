@@ -24,8 +24,6 @@ Friedman, The Elements of Statistical Learning (2009), section 7.2 (training, va
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
@@ -33,8 +31,13 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, begin, explain, is_worth_searching
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
-from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_far_less
-from analysis.diagnosis.search.revise_selection import exchange_effects, exchange_for_relatives, without_effect
+from analysis.diagnosis.search.parsimony import leaves_far_less
+from analysis.diagnosis.search.revise_selection import (
+    drop_needless,
+    drop_negligible,
+    exchange_effects,
+    exchange_for_relatives,
+)
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, shows_there_alone
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
@@ -42,10 +45,8 @@ from analysis.diagnosis.search.verdict import (
     as_good_as_noise,
     confirms_addition,
     judge,
-    shares_taken,
-    worth_naming,
 )
-from analysis.diagnosis.settings import EXPLAINED_ERROR, LAST_EFFECT_SHARE, MOST_EFFECTS
+from analysis.diagnosis.settings import EXPLAINED_ERROR, MOST_EFFECTS
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 from equalizer.signals.signal import FloatArray
@@ -59,38 +60,10 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
     if found.statistic is not None or context.certain:
         return found
     if len(found.steps) > 1:
-        found = _drop_needless(context, found, time_left)
+        found = drop_needless(context, found, time_left)
     if context.references is None:
-        found = _drop_negligible(context, found)
+        found = drop_negligible(context, found)
     return keep_identifiable(context, found, time_left)
-
-
-def _drop_needless(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """Drop the first of the effects without which the others fit as well: an earlier one may have stood in for a later
-    one, and the last may have led the others out of a local minimum. Of three, also one without which two fit as well
-    as laws of a real device do: none is exact, and a third takes up what they leave."""
-    for number in range(len(found.steps)):
-        if not time_left():
-            break
-        others = without_effect(context, found, number)
-        if not np.isfinite(others.steps[-1].fitted.cost):
-            continue
-        needless = not is_worthwhile(others.steps[-1], found.steps[-1])
-        if needless or (len(others.steps) > 1 and as_good_as_noise(others)):
-            return others if len(others.steps) < 2 else _drop_needless(context, others, time_left)
-    return found
-
-
-def _drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
-    """Drop last effects that take little and leave more than noise."""
-    while len(found.steps) > 1 and not as_good_as_noise(found):
-        if shares_taken(found.retuned, found.steps)[-1] >= LAST_EFFECT_SHARE:
-            break
-        fewer = without_effect(context, found, len(found.steps) - 1)
-        if not worth_naming(fewer):
-            break
-        found = fewer
-    return found
 
 
 TEST_HALF_USED = (

@@ -72,6 +72,8 @@ class SearchContext:
     """Faults that a recording shows by itself (`model_free_faults`): added without a search."""
     guard: Guard = field(default_factory=Guard)
     """Isolates crashes of single effects."""
+    opened: bool = False
+    """A part of the held-out samples is used to fit and to choose by."""
 
     def open_half(self) -> "SearchContext":
         """Copy of the context in which the first half of every held-out stretch is used to fit and to choose by."""
@@ -96,7 +98,7 @@ class SearchContext:
     def _open(self, opened: Sequence[Mask]) -> "SearchContext":
         records = (record.unseal(mask) for record, mask in zip(self.whole.records, opened, strict=True))
         whole = self.whole.with_records(tuple(records))
-        return replace(self, measure=whole.shorten(), whole=whole)
+        return replace(self, measure=whole.shorten(), whole=whole, opened=True)
 
     def fit_to_all(self) -> "SearchContext":
         """Copy of the context that also fits to the samples to choose by: what a force balance has chosen needs no

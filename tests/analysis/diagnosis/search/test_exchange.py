@@ -7,9 +7,10 @@ import pytest
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.explain import Explanation, retune_alone
-from analysis.diagnosis.search.revise_selection import exchange_effects, exchange_for_relatives
-from analysis.diagnosis.search.search import _drop_needless, prune
+from analysis.diagnosis.search.explain import Explanation, is_worth_searching, retune_alone
+from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little
+from analysis.diagnosis.search.revise_selection import drop_needless, exchange_effects, exchange_for_relatives
+from analysis.diagnosis.search.search import prune
 from analysis.diagnosis.search.time_budget import CountedBudget, always
 from analysis.diagnosis.settings import SEARCH_ON
 from equalizer.effects.catalogue import EFFECTS
@@ -169,16 +170,65 @@ def test_rivals_are_kept_only_where_they_were_compared(limited_and_late):
 def test_of_three_goes_the_one_without_which_two_fit_as_well_as_laws_of_real_devices_do(limited_and_late, place):
     claims = [claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ)]
     claims.insert(place, claim("viscous_damping", damping=0.01))
-    left = _drop_needless(limited_and_late, found_of(limited_and_late, *claims), always)
+    left = drop_needless(limited_and_late, found_of(limited_and_late, *claims), always)
     assert names(left) == ["force_saturation", "sensor_lag"]
 
 
-def test_three_stay_where_any_two_leave_more_than_laws_of_real_devices_do(arena_of):
+def three_effects(arena_of, k3):
     physics = {
         "force_saturation": {"limit": LIMIT_N},
         "sensor_lag": {"bandwidth": LAG_HZ},
-        "hardening_stiffness": {"k3": 4e5},
+        "hardening_stiffness": {"k3": k3},
     }
     context = arena_of(tuple(PlacedEffect(EFFECTS[name], (0,), values) for name, values in physics.items()))
-    found = found_of(context, *(claim(name, **values) for name, values in physics.items()))
-    assert names(_drop_needless(context, found, always)) == sorted(physics)
+    return context, found_of(context, *(claim(name, **values) for name, values in physics.items()))
+
+
+def test_three_stay_where_any_two_leave_more_than_laws_of_real_devices_do(arena_of):
+    context, found = three_effects(arena_of, 1e5)
+    assert not leaves_little(found.retuned, found.steps[1])
+    assert names(drop_needless(context, found, always)) == names(found)
+
+
+def test_a_third_goes_though_it_shows_where_two_leave_as_little_as_laws_of_real_devices_do(arena_of):
+    context, found = three_effects(arena_of, 5e4)
+    two = found.steps[1]
+    assert two.score.worst_channel > SEARCH_ON
+    assert is_worthwhile(two, found.steps[2])
+    assert names(drop_needless(context, found, always)) == ["force_saturation", "sensor_lag"]
+    # So it is not looked for, but in samples that were opened: few among many.
+    assert not is_worth_searching(context, found, two)
+    assert is_worth_searching(replace(context, opened=True), found, two)
+    # Nor is one of the two exchanged.
+    pair = replace(found, after=context.with_test_score(two), steps=found.steps[:2], rounds=found.rounds[:2])
+    assert exchange_effects(context, pair, list(EFFECTS.values()), quiet, always) is pair
+
+
+def test_the_last_goes_where_it_only_led_the_others_out_of_a_local_minimum(limited_and_late):
+    right = found_of(limited_and_late, claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ))
+    worse = right.steps[1].fitted
+    moved = replace(worse.hypothesis, point=worse.hypothesis.point + 0.2)
+    stuck = limited_and_late.candidate(
+        evaluate_fit(limited_and_late.measure, limited_and_late.tuning, worse.deviations, moved)
+    )
+    helped = found_of(
+        limited_and_late,
+        claim("force_saturation", limit=LIMIT_N),
+        claim("sensor_lag", bandwidth=LAG_HZ),
+        claim("force_gain", gain=1.01),
+    )
+    found = replace(helped, steps=(helped.steps[0], stuck, helped.steps[2]))
+    assert is_worthwhile(stuck, helped.steps[2])
+    left = drop_needless(limited_and_late, found, always)
+    assert names(left) == ["force_saturation", "sensor_lag"]
+    assert left.after.score.worst_channel < SEARCH_ON
+    assert [each.newest for each in left.rounds[-1]] == ["sensor_lag"]
+
+
+def test_a_refinement_beside_a_wrong_second_must_gain_as_much_as_in_any_step(arena_of):
+    rubs = PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.08})
+    hardens = PlacedEffect(EFFECTS["hardening_stiffness"], (0,), {"k3": 3e6})
+    context = arena_of((rubs, PlacedEffect(EFFECTS["sensor_lag"], (0,), {"bandwidth": LAG_HZ}), hardens))
+    # Refinements take up a fifth of what the third effect leaves.
+    found = found_of(context, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
+    assert exchange_for_relatives(context, found, list(EFFECTS.values()), quiet, always) is found

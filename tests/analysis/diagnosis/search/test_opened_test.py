@@ -1,5 +1,7 @@
 """What is opened of the held-out samples where only they show a mismatch, and what stays sealed. Compiles."""
 
+from dataclasses import replace
+
 import pytest
 
 from analysis.diagnosis.data.observed import observe
@@ -36,6 +38,18 @@ def test_nothing_is_opened_of_a_test_of_one_level_or_where_the_milder_part_shows
     assert context.open_milder(known.retuned) is None
     context, known = arena_of(recorded((), 3, plan=SWEEP_AND_LOUDER))
     assert context.open_milder(known.retuned) is None
+
+
+def test_the_milder_part_is_opened_only_for_what_the_test_shows_most(shown):
+    context, known = arena_of(shown)
+    residuals = known.retuned.fitted.residuals[0].copy()
+    residuals[:, 0] *= 1e-3  # the milder part shows much in the position alone,
+    louder = replace(known.retuned.fitted, residuals=(residuals,))
+    most = known.retuned.score.test.copy()
+    position = replace(known.retuned, fitted=louder)
+    assert context.open_milder(replace(position, score=replace(position.score, test=most * [0, 1]))) is not None
+    # and the whole shows most in the acceleration.
+    assert context.open_milder(replace(position, score=replace(position.score, test=most * [1, 0]))) is None
 
 
 def test_opened_samples_are_to_fit_and_the_last_third_to_choose_by(shown):
