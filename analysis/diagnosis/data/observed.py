@@ -47,12 +47,12 @@ class Observed:
             choose[chosen:stop] = True
         return replace(self, fit=fit, choose=choose, test=self.test & ~opened)
 
-    def first_halves(self) -> Mask:
-        """(n,): the first half of each held-out stretch."""
+    def every_other_part(self, parts: int) -> Mask:
+        """(n,): the first, third … of so many equal parts of each held-out stretch."""
         edges = np.flatnonzero(np.diff(np.concatenate([[0], self.test.astype(np.int8), [0]]))).reshape(-1, 2)
         found = np.zeros(len(self.test), dtype=np.bool_)
         for start, stop in edges.tolist():
-            found[start : start + (stop - start) // 2] = True
+            found[start:stop] = (np.arange(stop - start) * parts // (stop - start)) % 2 == 0
         return found
 
     def held_out_levels(self) -> list[tuple[Segment, float]]:

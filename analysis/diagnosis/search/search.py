@@ -11,7 +11,7 @@ Theory of operation.
 3. `verdict.judge` compares the held-out errors, in units of the noise, with limits: on samples that neither fitted nor
    chose anything, a wrong explanation has no advantage over a right one.
 4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), the
-   search is repeated with a part of them opened: all but the loudest segments, else the first half of each stretch.
+   search is repeated with a part of them opened: all but the loudest segments, else half of each stretch.
    What it finds must be confirmed by the part that is still held out.
 5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`): before a second
    effect is looked for, as a law that alone explains is a shorter description than two effects, and at the end. A law
@@ -38,7 +38,12 @@ from analysis.diagnosis.search.revise_selection import (
     exchange_effects,
     exchange_for_relatives,
 )
-from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, shows_there_alone
+from analysis.diagnosis.search.search_context import (
+    HALVES,
+    FittedCandidate,
+    SearchContext,
+    shows_there_alone,
+)
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
     Judgement,
@@ -69,6 +74,10 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
 TEST_HALF_USED = (
     "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
     "such stretch was used to find it, the second half to confirm it."
+)
+TEST_PARTS_USED = (
+    "What was kept for the test shows something that the rest of the recording does not hold, each stretch in one half "
+    "alone: every other of several equal parts of each such stretch was used to find it, those between to confirm it."
 )
 MILDER_TEST_USED = (
     "What was kept for the test shows something that the rest of the recording does not hold: all but the loudest of "
@@ -209,14 +218,14 @@ def _find_with_opened(
     first: SearchResult, left: FittedCandidate, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> SearchResult:
     """The search repeated with a part of the held-out samples to fit and to choose by: all but the loudest stretches
-    where the others show the mismatch, else the first half of each."""
+    where the others show the mismatch, else the first half of each, or every other of more parts."""
     milder = first.context.open_milder(left)
-    context = first.context.open_half() if milder is None else milder
+    context, parts = first.context.open_alternate(left) if milder is None else (milder, 0)
     going_on = left is first.found.after and as_good_as_noise(first.found)
     begun = first.found.rounds[: len(first.found.steps)] if going_on else ()
     found = explain(context, catalogue, progress, time_left, begun)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
-    used = TEST_HALF_USED if milder is None else MILDER_TEST_USED
+    used = {0: MILDER_TEST_USED, HALVES: TEST_HALF_USED}.get(parts, TEST_PARTS_USED)
     return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
 
 

@@ -53,6 +53,11 @@ class FittedCandidate:
         return np.inf if np.isnan(left) else left
 
 
+HALVES, FINER_PARTS = 2, (8, 32)
+"""Parts into which held-out stretches are cut where some are opened; finer ones only where coarser ones do not leave
+the mismatch in both. A thirty-second of some seconds is longer than errors are correlated."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchContext:
     """The measures, the open parameters and the rules that all fits of a search share."""
@@ -75,13 +80,19 @@ class SearchContext:
     opened: bool = False
     """A part of the held-out samples is used to fit and to choose by."""
 
-    def open_half(self) -> "SearchContext":
-        """Copy of the context in which the first half of every held-out stretch is used to fit and to choose by."""
-        return self._open([record.first_halves() for record in self.whole.records])
+    def open_alternate(self, shows: FittedCandidate) -> "tuple[SearchContext, int]":
+        """Copy of the context in which a part of every held-out stretch is used to fit and to choose by, and into how
+        many parts stretches were cut: the first of two, or, where one half alone shows the mismatch (as of a sweep),
+        every other of more. shows: as of `open_milder`."""
+        for parts in (HALVES, *FINER_PARTS):
+            opened = [record.every_other_part(parts) for record in self.whole.records]
+            if self._both_show(opened, shows):
+                return self._open(opened), parts
+        return self._open([record.every_other_part(HALVES) for record in self.whole.records]), HALVES
 
     def open_milder(self, shows: FittedCandidate) -> "SearchContext | None":
         """Copy of the context in which all held-out segments but the loudest are used to fit and to choose by, where
-        these show, in the channel where the held-out samples show most, a mismatch that the other samples do not: the
+        both show, in the channel where the held-out samples show most, a mismatch that the other samples do not: the
         loudest still tests by another kind of command. None where they do not. shows: a fit with its residuals in all
         samples, and its held-out errors."""
         records = self.whole.records
@@ -89,11 +100,16 @@ class SearchContext:
         opened = [record.held_out_below(max(levels, default=0.0) / LOUDER) for record in records]
         if not any(mask.any() for mask in opened):
             return None
-        scale = self.whole.unit / self.whole.noise
-        errors = rms_over(records, shows.fitted.residuals, opened) * scale
+        return self._open(opened) if self._both_show(opened, shows) else None
+
+    def _both_show(self, opened: list[Mask], shows: FittedCandidate) -> bool:
+        """Whether opened samples and those that stay held out show what the other samples do not."""
         # Another channel may show a little of something else, such as friction that is not fitted to the last.
-        most = int(np.argmax(np.nan_to_num(shows.score.test)))
-        return self._open(opened) if shows_there_alone(errors[[most]], shows) else None
+        records, most = self.whole.records, int(np.argmax(np.nan_to_num(shows.score.test)))
+        sealed = [record.test & ~mask for record, mask in zip(records, opened, strict=True)]
+        scale = self.whole.unit / self.whole.noise
+        errors = [(rms_over(records, shows.fitted.residuals, part) * scale)[[most]] for part in (opened, sealed)]
+        return all(shows_there_alone(each, shows) for each in errors)
 
     def _open(self, opened: Sequence[Mask]) -> "SearchContext":
         records = (record.unseal(mask) for record, mask in zip(self.whole.records, opened, strict=True))

@@ -8,6 +8,7 @@ from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.search.search import MILDER_TEST_USED
+from analysis.diagnosis.search.search_context import FINER_PARTS, HALVES
 from tests.diagnosed import device
 from tests.lawful import arena_of, law, recorded
 
@@ -52,9 +53,18 @@ def test_the_milder_part_is_opened_only_for_what_the_test_shows_most(shown):
     assert context.open_milder(replace(position, score=replace(position.score, test=most * [1, 0]))) is None
 
 
+def test_the_milder_part_is_opened_only_where_the_loudest_can_confirm(shown):
+    context, known = arena_of(shown)
+    residuals = known.retuned.fitted.residuals[0].copy()
+    residuals[shown.segments[-1].start :] *= 1e-3
+    quiet = replace(known.retuned, fitted=replace(known.retuned.fitted, residuals=(residuals,)))
+    assert context.open_milder(known.retuned) is not None
+    assert context.open_milder(quiet) is None
+
+
 def test_opened_samples_are_to_fit_and_the_last_third_to_choose_by(shown):
     record = observe(shown, 1)
-    opened = record.unseal(record.first_halves())
+    opened = record.unseal(record.every_other_part(2))
     both = opened.fit | opened.choose
     assert not (both & opened.test).any()
     assert (both | opened.test).sum() == (record.fit | record.choose | record.test).sum()
@@ -72,3 +82,22 @@ def test_a_law_that_only_the_test_shows_is_named_and_proved_by_the_loudest(shown
     assert effects[0].law.expression.endswith("*x**3")
     assert effects[0].parameters["p0"].value == pytest.approx(-4e5, rel=0.05)
     assert MILDER_TEST_USED in found.remarks
+
+
+def test_stretches_that_show_it_in_one_half_alone_are_opened_in_finer_parts(shown):
+    context, known = arena_of(shown)
+    _, parts = context.open_alternate(known.retuned)
+    assert parts == HALVES
+    residuals = known.retuned.fitted.residuals[0].copy()
+    for stretch in shown.segments[-2:]:
+        residuals[(stretch.start + stretch.stop) // 2 : stretch.stop] *= 1e-3
+    early = replace(known.retuned, fitted=replace(known.retuned.fitted, residuals=(residuals,)))
+    opened, parts = context.open_alternate(early)
+    assert parts == FINER_PARTS[0]
+    record, before = opened.whole.records[0], context.whole.records[0]
+    loud = shown.segments[-1]
+    length = (loud.stop - loud.start) // parts
+    for number in range(parts):
+        middle = loud.start + number * length + length // 2
+        assert before.test[middle]
+        assert record.test[middle] == (number % 2 == 1)
