@@ -166,6 +166,23 @@ def test_the_limit_is_below_a_frequency_whose_median_is_shown_to_be_above_the_ca
     assert analysis.medians[2].lower_n > 3.0 and analysis.limit.upper_hz < 45.0
 
 
+@pytest.mark.parametrize("shown_above", [(25.0,), (25.0, 45.0)])
+def test_the_interval_ends_below_the_first_frequency_shown_to_be_above_the_cap(shown_above):
+    rng, hz = np.random.default_rng(1), (5.0, 15.0, 25.0, 45.0)
+    noise = rng.standard_normal((10, 4))
+    pseudo = np.array([-6.0, 3.0, 14.0, 25.0]) + np.array([1.0, 1.0, 12.0, 30.0]) * (noise - noise.mean(axis=0))
+    assert direction_limit(hz, pseudo, 9.5, 0.95).upper_hz is None
+    found = direction_limit(hz, pseudo, 9.5, 0.95, shown_above=shown_above)
+    assert 15.0 < found.lower_hz < found.frequency_hz < found.upper_hz < 25.0
+
+
+def test_the_interval_goes_on_where_the_median_is_below_the_cap_again():
+    noise = np.random.default_rng(1).standard_normal((10, 4))
+    pseudo = np.array([-6.0, 14.0, 9.0, 14.0]) + noise - noise.mean(axis=0)
+    found = direction_limit((5.0, 15.0, 25.0, 45.0), pseudo, 9.5, 0.95, shown_above=(15.0, 45.0))
+    assert 25.0 < found.upper_hz < 45.0
+
+
 def test_an_interval_narrower_than_the_grid_still_holds_the_limit():
     pseudo = np.array([-8.0, -4.0, 0.0, 8.0, 12.0]) + 1e-9 * np.arange(10)[:, None]
     found = direction_limit(HZ, pseudo, 10.0, 0.95)
