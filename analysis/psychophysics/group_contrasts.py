@@ -38,7 +38,7 @@ class Contrast:
     upper_db: float
     p: float
     p_holm: float
-    """Holm's, over all contrasts of the family: together wrong in at most 5 %."""
+    """Holm's, over all contrasts of the family, also those that are not told: together wrong in at most 5 %."""
     effect_size: float | None
     """Mean over standard deviation of the differences (Cohen's d_z); None where the differences are not known."""
     p_equivalence: float | None
@@ -73,9 +73,12 @@ def mean_errors(values: FloatArray, known: NDArray[np.bool_]) -> MeanErrors:
     known_df = np.maximum(people - 1, 1)
     inside = np.sum(squares * known, axis=0) * people / known_df
     outside, others = np.sum(squares * ~known, axis=0), np.maximum(n - people, 1)
-    error, df = np.sqrt(inside + outside), (inside + outside) ** 2 / (inside**2 / known_df + outside**2 / others)
-    error = np.where(people == n, values.std(axis=0, ddof=1) / math.sqrt(n), error)
-    return MeanErrors(people, np.where(people < 2, math.inf, error), np.where(people == n, n - 1.0, df))
+    error = np.where(people == n, values.std(axis=0, ddof=1) / math.sqrt(n), np.sqrt(inside + outside))
+    # Where all values are equal both parts are 0.
+    below = inside**2 / known_df + outside**2 / others
+    df = np.where(people == n, n - 1.0, known_df)
+    df = np.divide((inside + outside) ** 2, below, out=df, where=(people < n) & (below > 0))
+    return MeanErrors(people, np.where(people < 2, math.inf, error), df)
 
 
 def contrasts(
@@ -85,7 +88,8 @@ def contrasts(
     known: NDArray[np.bool_] | None = None,
 ) -> tuple[Contrast, ...]:
     """values_db: (n, k), NaN for a gap. Contrasts without two participants, or with differences equal in all, are
-    left out. known: (n, k), of pseudo-values, which have no gaps; see `mean_errors`."""
+    left out, but stay in Holm's family: its size is planned, and not chosen by the data. known: (n, k), of
+    pseudo-values, which have no gaps; see `mean_errors`."""
     known = np.isfinite(values_db) if known is None else known
     found = []
     for place in range(1, len(frequencies_hz)):
@@ -94,7 +98,7 @@ def contrasts(
         both, having = both[whole], np.asarray(known[whole][:, [0, place]].all(axis=1))
         if having.sum() >= 2 and np.ptp(both[:, 1] - both[:, 0]) > ROUNDING_DB:
             found.append((frequencies_hz[place], _Pair(both, having)))
-    corrected = holm_correction([pair.p for _, pair in found])
+    corrected = holm_correction([pair.p for _, pair in found], len(frequencies_hz) - 1)
     return tuple(
         _compute_contrast(frequency, frequencies_hz[0], pair, p_holm, confidence)
         for (frequency, pair), p_holm in zip(found, corrected, strict=True)
@@ -121,11 +125,13 @@ def pair_contrast(
     return next(iter(contrasts((pair_hz[1], pair_hz[0]), values_db[:, places], confidence, having)), None)
 
 
-def holm_correction(p_values: Sequence[float]) -> tuple[float, ...]:
-    """Holm's step-down correction for multiple tests, in the order given."""
+def holm_correction(p_values: Sequence[float], planned: int | None = None) -> tuple[float, ...]:
+    """Holm's step-down correction for multiple tests, in the order given. planned: size of the family, with tests that
+    have no p and so come last; None: those given."""
+    size = len(p_values) if planned is None else planned
     corrected, worst = [0.0] * len(p_values), 0.0
     for rank, index in enumerate(sorted(range(len(p_values)), key=lambda i: p_values[i])):
-        worst = max(worst, min(1.0, (len(p_values) - rank) * p_values[index]))
+        worst = max(worst, min(1.0, (size - rank) * p_values[index]))
         corrected[index] = worst
     return tuple(corrected)
 

@@ -200,6 +200,12 @@ def _ask_in_time(client: "Client", address: str) -> _Found:
     try:
         return asked.result(timeout=WORKER_TIMEOUT_S)
     except TimeoutError as problem:
+        if asked.done():  # an error of the question itself, which came before the time was up
+            raise _cluster_error(
+                f"The scheduler at {address} was reached, and asking its workers failed: "
+                f"{str(problem) or type(problem).__name__}.",
+                "Look at the scheduler, its workers and the network, then run the same command again.",
+            ) from problem
         raise StudyError(
             "The cluster does not answer",
             f"The scheduler at {address} was reached, but it or a worker said nothing more for {WORKER_TIMEOUT_S:g} s.",
@@ -211,7 +217,7 @@ def _ask_in_time(client: "Client", address: str) -> _Found:
 def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
     asked = _ask_in_time(client, address)
     found = asked.versions
-    if not found:
+    if not found or not asked.threads:  # they may have left between the two questions
         raise _cluster_error(f"The scheduler at {address} has no workers.", f"Start some: dask worker {address}.")
     own = own_version()
     if wrong := sorted({each or "none" for each in found.values() if each != own}):

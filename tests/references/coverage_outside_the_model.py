@@ -3,7 +3,8 @@
     python tests/references/coverage_outside_the_model.py STUDIES [NAME ...]
 
 Studies of ten participants under the published staircase, medians of 0.35, 0.7 and 1.4 N at 5, 25 and 45 Hz. Of the
-`few` kinds, 45 Hz has whole runs of a few people only, and the first eight answers of the others, or none.
+`few` kinds, 45 Hz has whole runs of a few people only, and eight answers of the others, drawn at random from
+their runs (not by level or outcome), or none.
 """
 
 import os
@@ -33,15 +34,14 @@ FEW = {f"few: {people} of ten, {count} answers of others": (people, count) for p
 
 
 def with_few(answers: Answers, people: int, count: int) -> Answers:
-    """The last frequency as played by some people, and `count` answers of the others there, strongest first."""
+    """The last frequency as played by some people, and `count` answers of the others there, drawn from
+    all of a run at random, so that neither level nor outcome chooses."""
     k, right, wrong = len(answers.frequencies_hz), answers.right.copy(), answers.wrong.copy()
     for person in range(people, answers.persons):
         cells = np.flatnonzero(answers.run == person * k + k - 1)
-        left = float(count)
-        for cell in cells[np.argsort(-answers.level_db[cells], kind="stable")]:
-            for given in (right, wrong):
-                given[cell] = min(left, given[cell])
-                left -= given[cell]
+        asked = np.concatenate([right[cells], wrong[cells]]).astype(np.int64)
+        drawn = np.random.default_rng((count, person)).multivariate_hypergeometric(asked, min(count, int(asked.sum())))
+        right[cells], wrong[cells] = drawn.reshape(2, -1)
     kept = right + wrong > 0
     return replace(
         answers, run=answers.run[kept], level_db=answers.level_db[kept], side=answers.side[kept],

@@ -98,12 +98,23 @@ def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
 
 def _turned_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
     """Participant and session where label 1 is the direction at the larger angle. Labels go with the session: a
-    participant who comes twice may have them the other way round."""
+    participant who comes twice may have them the other way round. A session in which only one of the two was measured
+    is compared with the larger angle of all sessions."""
     angles: dict[tuple[str, str], dict[int, float]] = {}
     for trial in trials:
         if trial.angle_deg is not None:
             angles.setdefault((trial.subject, trial.session), {})[trial.direction_shown] = trial.angle_deg
-    return frozenset(name for name, known in angles.items() if len(known) == 2 and known[1] > known[2])
+    pooled = {angle for known in angles.values() for angle in known.values()}
+    larger = max(pooled) if len(pooled) == 2 else None
+    return frozenset(name for name, known in angles.items() if _is_turned(known, larger))
+
+
+def _is_turned(known: dict[int, float], larger: float | None) -> bool:
+    """known: angles of a session by label; larger: angle of the study's two directions, None where they are not two."""
+    if len(known) == 2:
+        return known[1] > known[2]
+    ((label, angle),) = known.items()
+    return larger is not None and (label == 1) == (angle == larger)
 
 
 def _known(rows: list[Trial], value: Callable[[Trial], float | None]) -> list[float]:

@@ -14,9 +14,8 @@ LEVEL_GRID_DB = 1e-6
 """Levels closer than this are one level: rounding in a table, far below any step."""
 
 FEWEST_ANSWERS = 20
-"""A person with fewer at a frequency is no independent witness of its median; or with less than half of the most that a
-person has there, where all have few. By simulation: eight answers of most people, and whole runs of one or two, left
-intervals of 95 % with 75 to 85 %."""
+"""A person with fewer at a frequency, and with less than half of the most that a person has there, is no independent
+witness of its median; but is where none of their runs, at all frequencies, is so much shorter than their longest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +53,10 @@ class Answers:
         shape = self.persons, len(self.frequencies_hz)
         trials = np.bincount(self.run, weights=self.right + self.wrong, minlength=math.prod(shape))
         trials = trials.reshape(shape)
-        enough: NDArray[np.bool_] = trials >= np.clip(0.5 * trials.max(axis=0), 1.0, FEWEST_ANSWERS)
+        # Of a person who lacks a frequency the longest run tells nothing: it may be broken off, too.
+        own = np.where(trials.min(axis=1) > 0, trials.max(axis=1), math.inf)
+        most = np.minimum(trials.max(axis=0), own[:, None])
+        enough: NDArray[np.bool_] = trials >= np.clip(0.5 * most, 1.0, FEWEST_ANSWERS)
         return enough
 
 

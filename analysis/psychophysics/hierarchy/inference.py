@@ -160,7 +160,8 @@ def direction_limit(
     """Estimate the direction limit from pseudo-thresholds (n, k). Between the frequencies played: straight lines over
     the logarithm of frequency. The interval holds every frequency whose median threshold may be the cap: its own
     interval contains the cap. known: (n, k), see `mean_errors`; None: all. shown_above: frequencies whose median has a
-    profile bound above the cap: there an interval by influence functions is as wide as the model's extrapolation."""
+    profile bound above the cap: there an interval by influence functions is as wide as the model's extrapolation. From
+    such a frequency on the limit cannot lie, up to the next whose estimate is below the cap."""
     grid = np.geomspace(frequencies_hz[0], frequencies_hz[-1], 2001)
     weights = np.array([np.interp(np.log(grid), np.log(frequencies_hz), row) for row in np.eye(len(frequencies_hz))])
     lines = pseudo @ weights
@@ -170,7 +171,11 @@ def direction_limit(
     half = student.ppf(0.5 + confidence / 2, errors.df) * errors.error
     crossings = np.flatnonzero((middle[:-1] < cap_db) & (middle[1:] >= cap_db))
     may_be = (middle - half <= cap_db) & (middle + half >= cap_db)
-    may_be[[int(np.abs(grid - frequency_hz).argmin()) for frequency_hz in shown_above]] = False
+    places = [int(np.abs(grid - frequency_hz).argmin()) for frequency_hz in frequencies_hz]
+    below = [place for place in places if middle[place] < cap_db]
+    for place, frequency_hz in zip(places, frequencies_hz, strict=True):
+        if frequency_hz in shown_above:
+            may_be[place : next((other for other in below if other > place), None)] = False
     # The frequencies of the grid may all miss an interval that is narrower than their distance: the limit lies between
     # that before the crossing and the next.
     may_be[crossings] = may_be[crossings + 1] = True

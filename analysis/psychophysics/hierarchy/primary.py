@@ -28,7 +28,7 @@ CONFIDENCE = 0.95
 FAR_ABOVE_DB = 6.0
 """Of two medians that both lie this far above the cap no difference is told: the right answers are hardly more than
 chance at all levels, the sizes are extrapolated, and their differences have no known error."""
-FAR_ABOVE = "The medians lie at more than twice the cap: nothing is known of their differences."
+FAR_ABOVE = "Two medians or more lie at more than twice the cap: nothing is known of their differences."
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +71,7 @@ class PrimaryAnalysis:
     lapse: float
     goodness: GoodnessOfFit
     converged: bool
+    """Both fits: that of all answers, and that of the analysis of variance where some people are left out of it."""
     missing_hz: tuple[float, ...] = ()
     """Frequencies of the protocol without any answer: the model leaves them out."""
     declared_contrast: Contrast | None = None
@@ -116,7 +117,7 @@ def primary_analysis(
         criterion_sd=float(sds[3]),
         lapse=fit.lapse,
         goodness=goodness_of_fit(fit),
-        converged=fit.converged,
+        converged=fit.converged and compared.converged,
         missing_hz=tuple(frequency_hz for frequency_hz in asked_hz if frequency_hz not in frequencies),
         declared_contrast=compared.declared,
         far_above_hz=compared.far_above_hz,
@@ -131,6 +132,8 @@ class _Compared:
     contrasts: tuple[Contrast, ...]
     declared: Contrast | None
     far_above_hz: tuple[float, ...]
+    converged: bool
+    """Whether the fit of the analysis of variance found its end."""
 
 
 def _compare(fit: HierarchicalFit, cap_db: float, confidence: float, declared_hz: Sequence[float]) -> _Compared:
@@ -138,33 +141,37 @@ def _compare(fit: HierarchicalFit, cap_db: float, confidence: float, declared_hz
     far = fit.means_db > cap_db + FAR_ABOVE_DB
     far_hz = tuple(frequency_hz for frequency_hz, is_far in zip(frequencies, far, strict=True) if is_far)
     # The first is the reference: from one far above the cap, another such has no difference.
-    told = np.flatnonzero(~(far & far[0]) | (np.arange(len(far)) == 0))
-    hz = tuple(frequencies[place] for place in told)
+    told = ~(far & far[0]) | (np.arange(len(far)) == 0)
     declared = None
     if not set(declared_hz) <= set(far_hz):
         declared = pair_contrast(frequencies, pseudo, declared_hz, confidence, played)
+    overall, converged = _overall(fit.answers, pseudo, fit.family, far)
     return _Compared(
-        overall=_overall(fit.answers, pseudo, fit.family, far),
-        contrasts=contrasts(hz, pseudo[:, told], confidence, played[:, told]),
+        overall=overall,
+        contrasts=contrasts(frequencies, pseudo, confidence, played & told),
         declared=declared,
         far_above_hz=far_hz,
+        converged=converged,
     )
 
 
-def _overall(answers: Answers, pseudo: FloatArray, family: Family, far: NDArray[np.bool_]) -> RepeatedMeasures:
-    """Analysis of variance within participants; none where all medians lie far above the cap. Of those without answers
-    at some frequency a pseudo-threshold there says nothing: they are left out, and the model is fitted to the others
-    alone."""
-    if far.all():
+def _overall(
+    answers: Answers, pseudo: FloatArray, family: Family, far: NDArray[np.bool_]
+) -> tuple[RepeatedMeasures, bool]:
+    """Analysis of variance within participants, and whether its own fit found its end; none where two medians or more
+    lie far above the cap: the difference between these is one of those it tests. Of those without answers at some
+    frequency a pseudo-threshold there says nothing: they are left out, and the model is fitted to the others alone."""
+    if far.sum() > 1:
         empty = repeated_measures((), ())
-        return replace(empty, participants=answers.persons, conditions=len(far), notes=(FAR_ABOVE,))
+        return replace(empty, participants=answers.persons, conditions=len(far), notes=(FAR_ABOVE,)), True
     whole: NDArray[np.bool_] = np.asarray(answers.played.all(axis=1))
-    values = np.full(pseudo.shape, np.nan)
+    values, converged = np.full(pseudo.shape, np.nan), True
     if whole.all():
         values = pseudo
     elif whole.sum() > 1:
-        values[whole] = pseudo_thresholds(fit_hierarchy(answers_of(answers, whole), family))
-    return repeated_measures(answers.subjects, values.tolist())
+        fit = fit_hierarchy(answers_of(answers, whole), family)
+        values[whole], converged = pseudo_thresholds(fit), fit.converged
+    return repeated_measures(answers.subjects, values.tolist()), converged
 
 
 def answers_of(answers: Answers, chosen: NDArray[np.bool_]) -> Answers:

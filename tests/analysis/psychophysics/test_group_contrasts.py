@@ -6,7 +6,7 @@ from scipy.stats import ttest_rel
 from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.weightstats import ttost_paired
 
-from analysis.psychophysics.group_contrasts import contrasts, holm_correction
+from analysis.psychophysics.group_contrasts import contrasts, holm_correction, mean_errors
 
 HZ = (5.0, 15.0, 25.0, 35.0)
 VALUES = np.array([0.0, 0.3, 1.0, 5.0]) + np.random.default_rng(3).normal(0, [1, 1, 1, 6], (10, 4))
@@ -29,6 +29,16 @@ def test_equivalence_and_holm_agree_with_statsmodels():
     peer = multipletests([c.p for c in found], method="holm")[1]
     assert [c.p_holm for c in found] == pytest.approx(list(peer))
     assert holm_correction([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
+    whole = multipletests([0.01, 0.04, 1.0, 1.0], method="holm")[1][:2]
+    assert holm_correction([0.01, 0.04], planned=4) == pytest.approx(list(whole))
+
+
+@pytest.mark.parametrize("people", [2, 3])
+def test_values_that_are_all_equal_have_no_error_and_no_division_by_it(people):
+    known = np.arange(3)[:, None] < np.array([people, 3])
+    errors = mean_errors(np.ones((3, 2)), known)
+    assert errors.error.tolist() == [0.0, 0.0]
+    assert errors.df.tolist() == [people - 1.0, 2.0]
 
 
 def test_unequal_spread_is_found_and_equal_spread_is_not():

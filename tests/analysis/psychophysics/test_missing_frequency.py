@@ -8,7 +8,8 @@ import pytest
 from scipy.stats import sem
 
 from analysis.psychophysics.group_contrasts import mean_errors
-from analysis.psychophysics.hierarchy.answers import count_answers
+from analysis.psychophysics.hierarchy import primary
+from analysis.psychophysics.hierarchy.answers import count_answers, tally
 from analysis.psychophysics.hierarchy.primary import answers_of, primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd
 from analysis.psychophysics.power.simulated_study import simulate_study as simulate_crowd
@@ -106,6 +107,27 @@ def test_short_runs_of_all_are_not_few():
     """A protocol of short runs: all have as many answers as anyone."""
     short = with_few(STUDY, 0, 12)
     assert short.played.all()
+
+
+def answers_with(counts):
+    """counts: (persons, frequencies), numbers of answers."""
+    run = np.repeat(np.arange(np.size(counts)), np.ravel(counts))
+    subjects = tuple(f"s{number}" for number in range(len(counts)))
+    side, right = np.where(np.arange(len(run)) % 2, 1.0, -1.0), np.ones(len(run), dtype=bool)
+    return tally(subjects, PLAYED[: len(counts[0])], run, np.zeros(len(run)), side, right)
+
+
+def test_whole_short_runs_are_not_few_beside_the_long_ones_of_others():
+    played = answers_with([[60, 60], [16, 14], [60, 8], [8, 0], [60, 25]]).played
+    assert played.tolist() == [[True, True], [True, True], [True, False], [False, False], [True, True]]
+
+
+def test_the_fit_of_the_analysis_of_variance_must_converge_too(monkeypatch):
+    few = with_few(STUDY, 3, 0)
+    assert primary_analysis(few, 3.0).converged
+    own = primary.fit_hierarchy
+    monkeypatch.setattr(primary, "fit_hierarchy", lambda a, f: replace(own(a, f), converged=a.persons == 10))
+    assert not primary_analysis(few, 3.0).converged
 
 
 def test_errors_of_means_are_the_textbooks_where_all_have_answers_and_grow_to_those_of_the_few():

@@ -186,3 +186,19 @@ def test_the_watch_outlives_a_count_that_fails_in_an_unforeseen_way(address, mon
     ):
         monkeypatch.setattr(distributed.Client, "nthreads", fail)
         pool.submit(time.sleep, 600.0).result()
+
+
+def test_workers_that_leave_while_they_are_asked_are_no_workers(monkeypatch):
+    monkeypatch.setattr(cluster, "_ask", lambda client: cluster._Found({"tcp://w": cluster.own_version()}, ()))
+    with pytest.raises(StudyError, match=r"The scheduler at tcp://s has no workers\."):
+        cluster._require_workers(None, "tcp://s", one_thread=True)
+
+
+def test_a_question_that_fails_by_a_time_limit_of_its_own_is_no_silence(monkeypatch):
+    def fail(_):
+        raise TimeoutError("Timed out during handshake")
+
+    monkeypatch.setattr(cluster, "_ask", fail)
+    with pytest.raises(StudyError, match="asking its workers failed: Timed out during handshake") as ended:
+        cluster._require_workers(None, "tcp://s", one_thread=False)
+    assert "said nothing more" not in str(ended.value) and ended.value.saved == "Nothing was begun."

@@ -99,11 +99,32 @@ def test_nothing_is_known_of_differences_between_frequencies_that_no_one_tells()
     assert found.declared_contrast is None
     assert [c.frequency_hz for c in found.contrasts] == [35.0, 45.0]  # to 5 Hz, which is known
     assert all(c.lower_db > 6.0 for c in found.contrasts)
+    assert found.overall.f is None and found.overall.notes == (FAR_ABOVE,)  # it would test 45 against 35 Hz, too
     (nothing,) = studies(Crowd((5.0, 45.0), (1e4, 1e4)), 1, people=6)
     found = primary_analysis(nothing.answers, 3.0)
     assert found.far_above_hz == (5.0, 45.0)
     assert found.contrasts == () and found.overall.f is None and found.overall.p_huynh_feldt is None
     assert found.overall.notes == (FAR_ABOVE,)
+
+
+def test_a_contrast_that_is_not_told_stays_in_holms_family():
+    """The data choose which contrasts are told; the family that they are corrected for was planned."""
+    (study,) = studies(Crowd((5.0, 35.0, 45.0), (1e4, 2.5, 1e4)), 1, people=6)
+    found = primary_analysis(study.answers, 3.0)
+    assert found.far_above_hz == (5.0, 45.0)
+    (told,) = found.contrasts
+    assert told.frequency_hz == 35.0 and told.p > 0.0
+    assert told.p_holm == pytest.approx(min(1.0, 2.0 * told.p))
+
+
+def test_people_with_the_same_answers_have_no_spread_and_no_error_is_raised():
+    level = np.tile([0.0, -3.0, -6.0, -9.0], 36)
+    right = np.tile([True, True, True, False], 36)
+    answers = tally(("a", "b", "c"), (5.0, 45.0), np.repeat(np.arange(6), 24), level, np.tile([1.0, -1.0], 72), right)
+    found = primary_analysis(answers, 3.0)
+    assert found.contrasts == ()
+    for median in found.medians:
+        assert median.lower_db == pytest.approx(median.db) == pytest.approx(median.upper_db)
 
 
 def test_flat_thresholds_are_equal_and_equivalent():
@@ -164,6 +185,23 @@ def test_the_limit_is_below_a_frequency_whose_median_is_shown_to_be_above_the_ca
     (study,) = studies(Crowd((5.0, 25.0, 45.0), (0.3, 0.5, 8.0)), 1)
     analysis = primary_analysis(study.answers, 3.0)
     assert analysis.medians[2].lower_n > 3.0 and analysis.limit.upper_hz < 45.0
+
+
+@pytest.mark.parametrize("shown_above", [(25.0,), (25.0, 45.0)])
+def test_the_interval_ends_below_the_first_frequency_shown_to_be_above_the_cap(shown_above):
+    rng, hz = np.random.default_rng(1), (5.0, 15.0, 25.0, 45.0)
+    noise = rng.standard_normal((10, 4))
+    pseudo = np.array([-6.0, 3.0, 14.0, 25.0]) + np.array([1.0, 1.0, 12.0, 30.0]) * (noise - noise.mean(axis=0))
+    assert direction_limit(hz, pseudo, 9.5, 0.95).upper_hz is None
+    found = direction_limit(hz, pseudo, 9.5, 0.95, shown_above=shown_above)
+    assert 15.0 < found.lower_hz < found.frequency_hz < found.upper_hz < 25.0
+
+
+def test_the_interval_goes_on_where_the_median_is_below_the_cap_again():
+    noise = np.random.default_rng(1).standard_normal((10, 4))
+    pseudo = np.array([-6.0, 14.0, 9.0, 14.0]) + noise - noise.mean(axis=0)
+    found = direction_limit((5.0, 15.0, 25.0, 45.0), pseudo, 9.5, 0.95, shown_above=(15.0, 45.0))
+    assert 25.0 < found.upper_hz < 45.0
 
 
 def test_an_interval_narrower_than_the_grid_still_holds_the_limit():
