@@ -134,9 +134,10 @@ def exchange_for_relatives(
         evidence = gather_evidence(limited.measure, limited.tuning, base)[0]
         fits = find_first_fits(limited, tried, base, evidence, _again(progress), sites)
         better = [law for law in fits if law.cost < last.fitted.cost]
-        compared = compare_plausible(limited, base, better, evidence)
-        kept = without_effect(limited, found, 0) if compared else found
-        return kept, plainest_first([*compared, _with_first_at_end(limited, last)])
+        present = _with_first_at_end(limited, last)
+        compared = plainest_first([*compare_plausible(limited, base, better, evidence), present])
+        # The others are fitted anew only where the first effect goes.
+        return found if compared[0] is present else without_effect(limited, found, 0), compared
 
     return _exchange_first(context, found, compare) or found
 
