@@ -73,6 +73,19 @@ to have moved, before a reading that did not change is stale."""
 
 
 @part
+def _move_gripped(state: FloatArray, tick_s: float, force_n: float, at: tuple[int, int, int, int]) -> None:
+    """Move the gripped handle along an axis for a tick, and widen the range in which it was. at: cells of position,
+    speed, least and most position."""
+    place, speed, least, most = at
+    left = force_n - GRIPPED_N_PER_M * state[place]
+    left -= GRIPPED_N_S_PER_M * state[speed]
+    state[speed] += tick_s / GRIPPED_KG * left
+    state[place] += tick_s * state[speed]
+    state[least] = min(state[least], state[place])
+    state[most] = max(state[most], state[place])
+
+
+@part
 def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
     """Update the motion expected of the gripped handle in the last tick, by the stimulus: a hand at rest has held
     before what it holds now. Dry friction passes only the part of a force that exceeds the last one that moved the
@@ -89,12 +102,8 @@ def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
     state[MOVING_FORCE + 1] += share * y
     state[MOVING_FORCE + 2] += share * z
     for i in range(3):
-        left = state[MOVING_FORCE + i] - GRIPPED_N_PER_M * state[EXPECTED + i]
-        left -= GRIPPED_N_S_PER_M * state[EXPECTED_SPEED + i]
-        state[EXPECTED_SPEED + i] += settings[TICK_S] / GRIPPED_KG * left
-        state[EXPECTED + i] += settings[TICK_S] * state[EXPECTED_SPEED + i]
-        state[LEAST + i] = min(state[LEAST + i], state[EXPECTED + i])
-        state[MOST + i] = max(state[MOST + i], state[EXPECTED + i])
+        at = EXPECTED + i, EXPECTED_SPEED + i, LEAST + i, MOST + i
+        _move_gripped(state, settings[TICK_S], state[MOVING_FORCE + i], at)
 
 
 @part
@@ -134,12 +143,8 @@ def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
     beyond = state[PASSED_TWICE + i] - state[AXIS_FORCE + i]
     if abs(beyond) > settings[FRICTION]:
         state[AXIS_FORCE + i] += beyond - math.copysign(settings[FRICTION], beyond)
-    left = state[AXIS_FORCE + i] - GRIPPED_N_PER_M * state[AXIS_EXPECTED + i]
-    left -= GRIPPED_N_S_PER_M * state[AXIS_SPEED + i]
-    state[AXIS_SPEED + i] += settings[TICK_S] / GRIPPED_KG * left
-    state[AXIS_EXPECTED + i] += settings[TICK_S] * state[AXIS_SPEED + i]
-    state[AXIS_LEAST + i] = min(state[AXIS_LEAST + i], state[AXIS_EXPECTED + i])
-    state[AXIS_MOST + i] = max(state[AXIS_MOST + i], state[AXIS_EXPECTED + i])
+    at = AXIS_EXPECTED + i, AXIS_SPEED + i, AXIS_LEAST + i, AXIS_MOST + i
+    _move_gripped(state, settings[TICK_S], state[AXIS_FORCE + i], at)
 
 
 @part
