@@ -170,12 +170,5 @@ def _compute_contrast(
     )
 
 
-def equivalence_p(differences_db: FloatArray, margin_db: float = EQUIVALENCE_DB) -> float:
-    """The larger p of two one-sided tests: small where the mean difference is shown to lie within the margin."""
-    n = len(differences_db)
-    error = float(differences_db.std(ddof=1)) / math.sqrt(n)
-    return _equivalence_p(float(differences_db.mean()), error, n - 1, margin_db)
-
-
 def _equivalence_p(mean_db: float, error_db: float, df: float, margin_db: float = EQUIVALENCE_DB) -> float:
     return float(student.sf((margin_db - abs(mean_db)) / error_db, df))

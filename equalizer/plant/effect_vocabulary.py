@@ -7,12 +7,11 @@ rotation angle, `ppm` > 0 takes the response at t (1 + ppm 1e-6), `per_m` is M (
 """
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from equalizer.signals.unit_system import ROTATIONAL, UnitSystem
 
 Place = Literal["mechanism", "hand", "actuator", "sensor"]
-PLACES: tuple[Place, ...] = get_args(Place)
 
 RESPONSE = "response"
 """Placeholder for the response's unit in `EffectParameter.unit`."""

@@ -37,11 +37,6 @@ class ModelQuality:
             if value is not None and not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} is {value}; it must be a number that is not negative")
 
-    @property
-    def tested(self) -> bool:
-        """Whether the model was tested on a held-out record."""
-        return self.held_out_error is not None
-
 
 def model_quality(
     misfit_error: float,

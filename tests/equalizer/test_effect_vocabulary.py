@@ -1,6 +1,7 @@
 import re
+from typing import get_args
 
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, PLACES, RESPONSE
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, RESPONSE, Place
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 from equalizer.signals.units import parse_unit
 
@@ -21,7 +22,7 @@ def test_every_effect_of_the_contract_is_there_with_its_place_and_parameters(sha
 
 def test_names_are_unique_and_places_known():
     assert len(EFFECTS_BY_NAME) == len(EFFECT_NAMES) >= 33
-    assert {effect.place for effect in EFFECT_NAMES} == set(PLACES)
+    assert {effect.place for effect in EFFECT_NAMES} == set(get_args(Place))
 
 
 def test_every_unit_is_one_that_files_may_use():

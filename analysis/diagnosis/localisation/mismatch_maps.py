@@ -159,10 +159,6 @@ class ModelError:
         # The power of one line is exponentially distributed, with a median of ln 2 times its mean.
         return (float(np.median(near) / np.log(2)), len(near)) if near else (0.0, 0)
 
-    def typical(self) -> Mapping[tuple[str, str], float]:
-        """Median share over all cells, by (channel, quantity)."""
-        return {channel: float(np.median([held.share for held in all_])) for channel, all_ in self.held.items()}
-
 
 def model_error(held_out: Sequence[MismatchCell]) -> ModelError:
     """The typical error of a model, from its held-out cells. held_out: cells of samples that nothing was fitted to, of

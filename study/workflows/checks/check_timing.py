@@ -20,7 +20,6 @@ from study.session.stimulus.timing_verdict import (
     lateness_of,
 )
 from study.session.views.views import DeviceFinding
-from study.workflows.checks.bare_loop import BareLoop
 
 LOOP_S = 0.1
 """Length of the loop of zero forces that is held (s)."""
@@ -43,8 +42,6 @@ class Timing:
     """Lateness of the device's own loop."""
     lateness: Lateness
     findings: tuple[DeviceFinding, ...]
-    bare: BareLoop | None = None
-    """A bare C loop at the same time; None where none was compared with."""
 
 
 def check_timing(

@@ -103,7 +103,7 @@ def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[f
         ticks = round(seconds * device.info.sample_rate_hz)
         late = round(timing.lateness.missing_a_tick * ticks)
     beside = judge_beside(late, ticks, run)
-    return replace(timing, findings=(*timing.findings, beside, judge_load(load)), bare=run.result)
+    return replace(timing, findings=(*timing.findings, beside, judge_load(load)))
 
 
 def _settings(name: str, timing_s: float) -> DeviceSettings:

@@ -36,11 +36,6 @@ class PlayedPiece:
         """Amplitude as finally played (N); below `requested_n` where something clipped before."""
         return self.piece.segment.amplitude
 
-    @property
-    def clipped(self) -> bool:
-        """Whether something was at its limit in the kept take too."""
-        return is_clipped(self.health)
-
 
 def is_clipped(health: Health) -> bool:
     """Whether something was at its limit, so that the take does not show the device alone."""

@@ -30,8 +30,6 @@ class ForceInjection:
     """(n,): the command that would have been needed with the fault."""
     actuator: bool = False
     """A fault of the drive: it does not exist where the motion is imposed."""
-    turns: bool = True
-    """Also meaningful for an axis that rotates continuously."""
     memory: bool = False
     """Depends on what was before: begins anew with each take."""
 
