@@ -26,6 +26,20 @@ class Inverse:
     """Multiply-adds per sample for all channels."""
 
 
+def baseline_inverses(
+    model: IdentifiedModel, measured: FrequencyResponse, frequency_hz: FloatArray
+) -> tuple[Inverse, ...]:
+    """All baseline inverses from the data of one place, the identified model's last."""
+    return (
+        no_equalization(model, frequency_hz),
+        static_gain(model, frequency_hz),
+        acceleration_matching(model, frequency_hz),
+        rigid_body(model, frequency_hz),
+        raw_estimate(measured, frequency_hz),
+        identified_inverse(model, frequency_hz),
+    )
+
+
 def no_equalization(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
     """No equalization: the wanted number in m/s² is commanded in N."""
     return Inverse("nothing", _constant_response(np.eye(*model.D.shape[::-1]), frequency_hz), 0)

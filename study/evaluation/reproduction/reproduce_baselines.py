@@ -8,8 +8,7 @@ import numpy as np
 from analysis.evaluation.reproduction.played_response import PlayedResponse, lines_of_band
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.feedforward.baselines import Inverse
-from equalizer.tracking.feedforward.comparison import baseline_inverses
+from equalizer.tracking.feedforward.baselines import Inverse, baseline_inverses
 from equalizer.tracking.workspace.blended_inverse import blend_at
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, blending_driver, single_model_driver
 from study.evaluation.reproduction.reproduce_playback import Driver, PlaybackRow, play_row
