@@ -12,7 +12,7 @@ from equalizer.identification.frequency_response.experiments import instrument_s
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.signal import FloatArray, Signal, runs_of
 
 STROKES_BELOW_HZ = 1.0
 """Sinusoids slower than this are strokes: the shipped daily check has 0.5 Hz, the lowest stimulus of a study 5 Hz."""
@@ -117,13 +117,10 @@ def _lost_per_path_n(recording: Recording, start: int, stop: int, axis: int) -> 
 
 def _second_halves_of_rests(recording: Recording) -> list[FloatArray]:
     """Stretches (k, outputs) at rest; in the first half of each rest what was excited dies away."""
-    still = np.concatenate([[False], ~instrument_signal(recording).any(axis=1), [False]])
-    edges = np.flatnonzero(np.diff(still.astype(np.int8)))
-    longest = int((edges[1::2] - edges[::2]).max(initial=0))
+    rests = runs_of(np.asarray(~instrument_signal(recording).any(axis=1)))
+    longest = max((stop - start for start, stop in rests), default=0)
     return [
-        recording.response.samples[(start + stop) // 2 : stop]
-        for start, stop in zip(edges[::2], edges[1::2], strict=True)
-        if stop - start > longest / 2
+        recording.response.samples[(start + stop) // 2 : stop] for start, stop in rests if stop - start > longest / 2
     ]
 
 

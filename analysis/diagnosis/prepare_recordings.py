@@ -18,7 +18,7 @@ from analysis.diagnosis.settings import BRIDGED, LEAST_KEPT
 from analysis.diagnosis.types import Mask
 from analysis.wording import begin_sentence, conjoin
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import FloatArray, runs_of
 
 STILL = 1e-9
 """Range of a signal over its size, below which changes are rounding errors."""
@@ -118,8 +118,7 @@ def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
     missing: Mask = np.asarray(np.isnan(recording.command.samples).any(axis=1))
     if not missing.any() or missing.all():
         return recording, ""
-    edges = np.flatnonzero(np.diff(missing, prepend=False, append=False)).reshape(-1, 2)
-    gaps = [(int(start), int(stop)) for start, stop in edges]
+    gaps = runs_of(missing)
     whole = _interpolate(recording.command.samples)
     wide = [gap for gap in gaps if not _can_bridge(recording.command.samples, gap[1] - gap[0])]
     narrow = [gap for gap in gaps if gap not in wide]

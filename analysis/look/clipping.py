@@ -12,7 +12,7 @@ import numpy as np
 from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.look.channels import Channel
 from analysis.look.check import Check, fine_if_none
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import FloatArray, runs_of
 
 CLIPPING = "clipping"
 LEAST_SAMPLES = 5
@@ -65,7 +65,7 @@ def count_clipped_samples(samples: FloatArray) -> int:
     next_below = int(np.sum((filled < top - tolerance) & (filled >= top - tolerance - width)))
     if at_top.sum() < LEAST_SAMPLES or at_top.sum() < _CROWDED * next_below / max(1.0, width / max(step, width)):
         return 0
-    runs = _runs(at_top)
+    runs = runs_of(at_top)
     beyond = [_extrapolated_rise(filled, start, stop) for start, stop in runs]
     needed = max(_STEPS * step, 1e-6 * float(np.ptp(known)))
     counted = [stop - start for (start, stop), over in zip(runs, beyond, strict=True) if over > needed]
@@ -92,8 +92,3 @@ def _extrapolated_rise(samples: FloatArray, start: int, stop: int) -> float:
         return 0.0
     slope = min(came, went) / back
     return float(max(0.0, slope) * (stop - start + 1) / 4)
-
-
-def _runs(marked: np.ndarray) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(np.int8), [0]])))
-    return [(int(start), int(stop)) for start, stop in zip(edges[::2], edges[1::2], strict=True)]

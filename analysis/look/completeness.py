@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.look.channels import Channel, rms
 from analysis.look.check import Check, fine_if_none
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import FloatArray, runs_of
 
 MISSING, CONSTANT, COPIES = "missing samples", "constant channels", "copied channels"
 _MANY = 0.2
@@ -27,7 +27,7 @@ def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[
 def _missing_check(channel: Channel, rate_hz: float) -> Check:
     lost = ~np.isfinite(channel.samples)
     count, first = int(lost.sum()), int(np.argmax(lost))
-    longest = _longest_run(np.asarray(lost, dtype=np.float64))
+    longest = max(stop - start for start, stop in runs_of(lost))
     return Check(
         MISSING,
         "wrong" if count > _MANY * len(lost) else "notice",
@@ -35,11 +35,6 @@ def _missing_check(channel: Channel, rate_hz: float) -> Check:
         f"is {longest} samples.",
         "Cut the gaps out with segments, or record again; analyses that need every sample refuse them by name.",
     )
-
-
-def _longest_run(marked: FloatArray) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0.0], marked, [0.0]])))
-    return int(np.max(edges[1::2] - edges[::2])) if len(edges) else 0
 
 
 def check_constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:

@@ -83,3 +83,9 @@ def _fold_equal_words(name: str, words: str | tuple[str, ...], channels: int) ->
     if len(words) != channels:
         raise ValueError(f"{len(words)} words of {name} for {channels} channels; one for all, or one per channel")
     return words[0] if len(set(words)) == 1 else tuple(words)
+
+
+def runs_of(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Start and stop of each run of true values in a mask (n,)."""
+    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))

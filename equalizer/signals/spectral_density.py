@@ -5,11 +5,8 @@ longer than most spectra.
 """
 
 import numpy as np
-import numpy.typing as npt
 
-from equalizer.signals.signal import FloatArray
-
-ComplexArray = npt.NDArray[np.complexfloating]
+from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def spectral_density(signal: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, FloatArray]:
@@ -30,6 +27,13 @@ def cross_density(first: FloatArray, other: FloatArray, rate_hz: float, length: 
 def hann(length: int) -> FloatArray:
     """Periodic Hann window, (length,)."""
     return np.asarray(0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
+
+
+def line_spectra(periods: FloatArray) -> ComplexArray:
+    """Spectra (periods, lines, channels) of samples (periods, length, channels), rfft / length without the mean and
+    without half the rate: white noise of variance s² has s² / length per line."""
+    length = periods.shape[1]
+    return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
 
 
 def _welch_average(

@@ -16,7 +16,7 @@ from analysis.diagnosis.settings import (
 )
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import FloatArray, runs_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,9 +39,8 @@ class Observed:
         """Copy in which the held-out samples of `opened` are used too: two thirds of each stretch to fit, the last
         third to choose by."""
         opened = opened & self.test
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], opened.astype(np.int8), [0]]))).reshape(-1, 2)
         fit, choose = self.fit.copy(), self.choose.copy()
-        for start, stop in edges.tolist():
+        for start, stop in runs_of(opened):
             chosen = start + 2 * (stop - start) // 3
             fit[start:chosen] = True
             choose[chosen:stop] = True
@@ -49,9 +48,8 @@ class Observed:
 
     def every_other_part(self, parts: int) -> Mask:
         """(n,): the first, third … of so many equal parts of each held-out stretch."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.test.astype(np.int8), [0]]))).reshape(-1, 2)
         found = np.zeros(len(self.test), dtype=np.bool_)
-        for start, stop in edges.tolist():
+        for start, stop in runs_of(self.test):
             found[start:stop] = (np.arange(stop - start) * parts // (stop - start)) % 2 == 0
         return found
 

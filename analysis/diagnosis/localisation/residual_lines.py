@@ -15,11 +15,12 @@ from analysis.diagnosis.data.spectral_lines import (
     octaves_between,
 )
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
-from analysis.diagnosis.noise.periods import Periods, mean_spectrum, settled_periods, spectra
+from analysis.diagnosis.noise.periods import Periods, mean_spectrum, settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
+from equalizer.signals.spectral_density import hann, line_spectra
 
 _WINDOW_S = 1.0
 """Length of a window where nothing is periodic."""
@@ -163,9 +164,9 @@ def _lines_of_windows(
 
 def _window_power(samples: FloatArray, starts: Sequence[int], length: int) -> FloatArray:
     """(windows, lines, channels)"""
-    hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
+    window = np.sqrt(8 / 3) * hann(length)
     periods = np.stack([samples[start : start + length] for start in starts])
-    return np.abs(spectra((periods - periods.mean(axis=1, keepdims=True)) * hann[:, None])) ** 2
+    return np.abs(line_spectra((periods - periods.mean(axis=1, keepdims=True)) * window[:, None])) ** 2
 
 
 def _noise_power(observation: Observation, lines_hz: FloatArray, periods: int) -> FloatArray:

@@ -1,8 +1,4 @@
-"""Whole settled periods of a recording's periodic segments, and their spectra.
-
-Spectra are rfft / length without the mean and without half the rate, so that white noise of variance s² has s² / length
-per line.
-"""
+"""Whole settled periods of a recording's periodic segments, and their spectra."""
 
 from dataclasses import dataclass
 
@@ -10,6 +6,7 @@ import numpy as np
 
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.spectral_density import line_spectra
 
 _TRANSIENT_RATIO = 2.0
 """Ratio of a period's difference from the last one, first third over last third (energy), above which it has not
@@ -68,18 +65,12 @@ def period_samples(samples: FloatArray, periods: Periods) -> FloatArray:
 
 def period_spectra(samples: FloatArray, periods: Periods) -> ComplexArray:
     """(periods, lines, channels); lines as in `Periods.frequency_hz`."""
-    return spectra(period_samples(samples, periods))
+    return line_spectra(period_samples(samples, periods))
 
 
 def mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
     """(lines, channels): spectrum of the mean period."""
-    return np.asarray(spectra(period_samples(samples, periods).mean(axis=0, keepdims=True))[0])
-
-
-def spectra(periods: FloatArray) -> ComplexArray:
-    """Spectra (periods, lines, channels) of samples (periods, length, channels)."""
-    length = periods.shape[1]
-    return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+    return np.asarray(line_spectra(period_samples(samples, periods).mean(axis=0, keepdims=True))[0])
 
 
 def _is_whole(recording: Recording, start: int, length: int) -> bool:

@@ -5,9 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.identification.frequency_response.experiments import instrument_signal
-from equalizer.identification.frequency_response.noise_floor import SETTLING_S, smooth_over_lines
+from equalizer.identification.frequency_response.noise_floor import (
+    interpolate_rest,
+    rest_intervals,
+    rest_powers,
+    smooth_over_lines,
+)
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import FloatArray, runs_of
+from equalizer.signals.spectral_density import hann
 
 _LEAST_SAMPLES = 8
 """Least samples of a window: recordings at less than 32 Hz have no window."""
@@ -40,7 +46,7 @@ def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise |
     if length < _LEAST_SAMPLES:
         return None
     variances = []
-    for start, stop in _rest_intervals(recording, _WINDOW_S):
+    for start, stop in rest_intervals(recording, _WINDOW_S):
         for at in range(start, stop - length + 1, length):
             stretch = samples[at : at + length]
             if np.isfinite(stretch).all():
@@ -57,23 +63,14 @@ def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArr
     length = round(_WINDOW_S * recording.sample_rate_hz)
     if length < _LEAST_SAMPLES:
         return None
-    hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
-    powers = []
-    for start, stop in _rest_intervals(recording, SETTLING_S):
-        for at in range(start, stop - length + 1, length // 2):
-            stretch = samples[at : at + length]
-            if np.isfinite(stretch).all():
-                spectrum = np.fft.rfft((stretch - stretch.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
-                powers.append(np.abs(spectrum) ** 2 / length)
+    powers = rest_powers(recording, samples, length)
     if not powers:
         return None
     lines_hz: FloatArray = np.arange(1.0, length // 2) * (recording.sample_rate_hz / length)
     mean = np.mean(powers, axis=0)
     if not mean.any(axis=0).all():
         return None
-    mean[:2] = mean[2:3]
-    smooth = smooth_over_lines(mean, 9)
-    density = np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
+    density = interpolate_rest(mean, lines_hz, frequency_hz)
     # Windows overlap by half, and a Hann window correlates neighbouring lines: about half of all lines are independent.
     return density, float(len(powers) * length / 2)
 
@@ -89,7 +86,7 @@ def quiet_band_noise(
     if len(samples) < 2 * _LEAST_LINES:
         return None
     n = len(samples)
-    window = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n))
+    window = np.sqrt(8 / 3) * hann(n)
     lines_hz: FloatArray = np.arange(1.0, n // 2) * (recording.sample_rate_hz / n)
     driven = np.abs(np.fft.rfft((command - command.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2
     smooth = smooth_over_lines(driven.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
@@ -106,18 +103,4 @@ def quiet_band_noise(
 
 def _longest_whole(samples: FloatArray) -> tuple[int, int]:
     """Start and stop of the longest stretch without a gap: edges of a filled gap would add power at all frequencies."""
-    known = np.isfinite(samples).all(axis=1).astype(np.int8)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], known, [0]]))).reshape(-1, 2)
-    if not len(edges):
-        return 0, 0
-    longest = edges[np.argmax(edges[:, 1] - edges[:, 0])]
-    return int(longest[0]), int(longest[1])
-
-
-def _rest_intervals(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
-    """Stretches without excitation, after settling. Recordings begin at rest."""
-    driven = ~(instrument_signal(recording) == 0).all(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], driven, [True]]).astype(np.int8)))
-    settling = round(settling_s * recording.sample_rate_hz)
-    rests = zip(edges[::2], edges[1::2], strict=True)
-    return [(int(start) + (settling if start else 0), int(stop)) for start, stop in rests]
+    return max(runs_of(np.asarray(np.isfinite(samples).all(axis=1))), key=lambda run: run[1] - run[0], default=(0, 0))

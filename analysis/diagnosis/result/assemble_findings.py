@@ -30,11 +30,10 @@ from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
-from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import axis_letter, model_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray
+from equalizer.signals.signal import FloatArray, runs_of
 
 if TYPE_CHECKING:
     from analysis.diagnosis.next_experiment.propose_experiment import Proposal
@@ -211,7 +210,7 @@ def _time_series(measure: ErrorMeasure, found: Explanation, names: Sequence[str]
                 before=before,
                 retuned=retuned,
                 after=after,
-                tested=_stretches(record.test),
+                tested=tuple(runs_of(record.test)),
             )
         )
     return tuple(time_series)
@@ -224,11 +223,6 @@ def _units(recording: Recording) -> tuple[str, ...]:
         for signal in signals
         for k in range(len(signal.channels))
     )
-
-
-def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
 
 
 # Rows of the residual where impacts are compared by band power: no simulation predicts single impacts.

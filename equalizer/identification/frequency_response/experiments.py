@@ -11,6 +11,7 @@ import numpy as np
 
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.spectral_density import hann, line_spectra
 
 BROADBAND_KINDS = ("sweep", "multisine", "noise", "binary")
 TRANSIENT_S = 5.0
@@ -101,11 +102,11 @@ def window_experiments(recordings: Sequence[Recording], window_s: float) -> Expe
     experiments: list[Experiment] = []
     for recording in recordings:
         length = max(8, round(window_s * recording.sample_rate_hz))
-        hann = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length)
+        window = hann(length)
+        window = window / np.sqrt(np.mean(window**2))
         for segment in _driven_segments(recording):
             starts = range(segment.start, segment.stop - length + 1, length // 2)
             whole = [start for start in starts if _is_whole(recording, start, length)]
-            window = hann / np.sqrt(np.mean(hann**2))
             # Unlike periods, windows are not alike: each is an experiment of its own.
             experiments += [_make_experiment(recording, [start], length, window) for start in whole]
     remark = f"No periodic excitation: averaged over Hann windows of {window_s:g} s (H1), which blur narrow resonances."
@@ -127,8 +128,7 @@ def _is_whole(recording: Recording, start: int, length: int) -> bool:
 def _make_experiment(recording: Recording, starts: Sequence[int], length: int, window: FloatArray) -> Experiment:
     def spectra(samples: FloatArray) -> ComplexArray:
         periods = np.stack([samples[start : start + length] for start in starts])
-        periods = (periods - periods.mean(axis=1, keepdims=True)) * window[:, None]
-        return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+        return line_spectra((periods - periods.mean(axis=1, keepdims=True)) * window[:, None])
 
     return Experiment(
         length,

@@ -6,7 +6,8 @@ import numpy as np
 
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray, runs_of
+from equalizer.signals.spectral_density import hann
 
 SETTLING_S = 0.5
 """Settling time after the last excitation, before samples count as rest."""
@@ -54,30 +55,38 @@ def smooth_over_lines(power: FloatArray, lines: int) -> FloatArray:
 def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:
     """Noise power density of the response at rest, as s(f) with s / length the power per line of a period of that
     length. Returns (lines, outputs), or None without a rest of sufficient length."""
-    spectra, lines_hz = [], np.empty(0)
+    powers, lines_hz = [], np.empty(0)
     for recording in recordings:
         length = round(_REST_WINDOW_S * recording.sample_rate_hz)
         lines_hz = np.arange(1, length // 2) * recording.sample_rate_hz / length
-        hann = np.sqrt(8 / 3) * (0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
-        for start, stop in _rest_intervals(recording):
-            for at in range(start, stop - length + 1, length // 2):
-                period = recording.response.samples[at : at + length]
-                if np.isfinite(period).all():
-                    spectrum = np.fft.rfft((period - period.mean(axis=0)) * hann[:, None], axis=0)[1 : length // 2]
-                    spectra.append(np.abs(spectrum) ** 2 / length)
-    if not spectra:
-        return None
-    mean = np.mean(spectra, axis=0)
-    # The lowest lines are left out: subtracting the mean of a window of half a second removes part of their noise.
+        powers += rest_powers(recording, recording.response.samples, length)
+    return interpolate_rest(np.mean(powers, axis=0), lines_hz, frequency_hz) if powers else None
+
+
+def rest_powers(recording: Recording, samples: FloatArray, length: int) -> list[FloatArray]:
+    """Power density (length // 2 - 1, channels) of each Hann window of samples (n, channels) at rest, without missing
+    samples; the windows overlap by half."""
+    window = np.sqrt(8 / 3) * hann(length)[:, None]
+    powers = []
+    for start, stop in rest_intervals(recording, SETTLING_S):
+        for at in range(start, stop - length + 1, length // 2):
+            part = samples[at : at + length]
+            if np.isfinite(part).all():
+                spectrum = np.fft.rfft((part - part.mean(axis=0)) * window, axis=0)[1 : length // 2]
+                powers.append(np.abs(spectrum) ** 2 / length)
+    return powers
+
+
+def interpolate_rest(mean: FloatArray, lines_hz: FloatArray, frequency_hz: FloatArray) -> FloatArray:
+    """(lines, channels): the mean of `rest_powers`, smoothed, at other frequencies."""
+    # The lowest lines are left out: subtracting the mean of a window removes part of their noise.
     mean[:2] = mean[2:3]
     smooth = smooth_over_lines(mean, 9)
     return np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
 
 
-def _rest_intervals(recording: Recording) -> list[tuple[int, int]]:
+def rest_intervals(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
     """Intervals (start, stop) without excitation, after settling. Recordings begin at rest."""
-    driven = ~(instrument_signal(recording) == 0).all(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], driven, [True]]).astype(np.int8)))
-    settling = round(SETTLING_S * recording.sample_rate_hz)
-    rests = zip(edges[::2], edges[1::2], strict=True)
-    return [(int(start) + (settling if start else 0), int(stop)) for start, stop in rests]
+    rests = runs_of((instrument_signal(recording) == 0).all(axis=1))
+    settling = round(settling_s * recording.sample_rate_hz)
+    return [(start + (settling if start else 0), stop) for start, stop in rests]

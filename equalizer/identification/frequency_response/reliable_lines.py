@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import BoolArray
-from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.signal import ComplexArray, FloatArray, runs_of
 
 _LEAST_INDEPENDENCE = 0.1
 """Least singular value of the matrix whose columns are the excited directions, each of unit length: 1 where they are
@@ -89,12 +89,11 @@ def spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
 
 def _spans(frequency_hz: FloatArray, chosen: BoolArray) -> str:
     """ "below 4 Hz and above 38 Hz", or how many lines where they are scattered."""
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
-    spans = list(zip(ends[::2], ends[1::2] - 1, strict=True))
+    spans = runs_of(chosen)
     if len(spans) > 3:
         first, last = frequency_hz[chosen][[0, -1]]
         return f"{int(chosen.sum())} lines between {first:.4g} and {last:.4g} Hz"
-    return " and ".join(_span(frequency_hz, int(first), int(last)) for first, last in spans)
+    return " and ".join(_span(frequency_hz, first, stop - 1) for first, stop in spans)
 
 
 def _span(frequency_hz: FloatArray, first: int, last: int) -> str:

@@ -15,6 +15,7 @@ from equalizer.identification.frequency_response.frequency_response import BoolA
 from equalizer.identification.frequency_response.noise_floor import period_variance, smooth_over_lines
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
+from equalizer.signals.spectral_density import line_spectra
 
 _SPARE = 8
 """Least number of lines beyond the unknowns of a window."""
@@ -189,5 +190,4 @@ def _whole_periods(recording: Recording, segment: Segment) -> tuple[list[int], i
 def _spectra(samples: FloatArray, starts: Sequence[int], length: int) -> ComplexArray:
     """Spectra (periods, lines, channels), one period per start."""
     periods = np.stack([samples[start : start + length] for start in starts])
-    periods = periods - periods.mean(axis=1, keepdims=True)
-    return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
+    return line_spectra(periods - periods.mean(axis=1, keepdims=True))
