@@ -72,6 +72,11 @@ class Recording(Summarised):
     def sample_rate_hz(self) -> float:
         return self.response.sample_rate_hz
 
+    @property
+    def is_rotational(self) -> bool:
+        """Whether a response or command channel is an angle, its derivative or a torque, by its unit."""
+        return any(unit.startswith(("rad", "N m")) for unit in (*self.response.units, *self.command.units))
+
     def __len__(self) -> int:
         return len(self.response)
 

@@ -12,7 +12,6 @@ from analysis.diagnosis.contrast.force_base import force_base
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, BALANCE_HOLDS, CONSTANT_SIGNAL, MOTIONS_APART
 from analysis.diagnosis.types import Mask
-from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 
@@ -20,7 +19,7 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tupl
     """Force balances, one per axis, where they fit the clean side; then autoregressive models, one per response. Each
     with the motions of both sides (the faulty one may be empty); empty where none was measured."""
     recording = clean[0].recording
-    turning = is_rotational(recording)
+    turning = recording.is_rotational
     motions: tuple[Motion, ...] = ()
     with suppress(NoMotionError):
         first = motions_of([part.to_observed() for part in clean])
@@ -52,11 +51,6 @@ def _detrended_mean_squares(part: Part) -> FloatArray:
     at = np.arange(len(part.response)) - (len(part.response) - 1) / 2
     moved = part.response - part.response.mean(axis=0)
     return np.asarray(np.mean((moved - at[:, None] * (at @ moved / max(float(at @ at), 1.0))) ** 2, axis=0))
-
-
-def is_rotational(recording: Recording) -> bool:
-    """Whether a response or command channel is an angle, its derivative or a torque, by its unit."""
-    return any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))
 
 
 def unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:

@@ -22,7 +22,6 @@ from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.bases import (
     bases_of,
-    is_rotational,
     move_alike,
     unexplained_share,
     unexplained_share_of_rows,
@@ -101,7 +100,7 @@ def _set_up(
     lag_samples = 1 if by_force else round(row_s * clean[0].rate_hz)
     rows = Rows(lag_samples, likely_delays_s(compared_bases), LATE_STEP * row_s, likely_clock_rates(compared_bases))
     faults: list[Fault] = []
-    turns = is_rotational(recording)
+    turns = recording.is_rotational
     for axis, name in enumerate(recording.command.channels):
         if timed:
             faults += mechanism_faults(axis, name, motions, lambda part: motion_of[id(part.recording)], turns)

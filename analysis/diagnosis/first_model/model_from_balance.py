@@ -40,7 +40,6 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
         float(np.max(np.abs(given - full)) / 2 + FOUND_NUMBERS_OPEN * np.abs(given).max())
         for given, full in zip((mass, damping, stiffness), beside, strict=True)
     ]
-    turning = any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))
     return MechanicalModel(
         name,
         recording.response.quantities[0],
@@ -51,7 +50,7 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
         np.eye(count),
         tolerance=Tolerance(max(spread[0], 1e-12), max(spread[1], 1e-12), max(spread[2], 1e-12), None),
         actuator=ActuatorLimits(delay_s=_common_delay_s(balances)),
-        rotational=turning,
+        rotational=recording.is_rotational,
     )
 
 

@@ -57,8 +57,9 @@ def _is_square(recording: Recording) -> bool:
 
 def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
     eye = np.eye(len(recording.command.channels))
-    turning = any(unit.startswith(("rad", "N m")) for unit in (*recording.response.units, *recording.command.units))
-    return MechanicalModel(name, recording.response.quantities[0], eye, 0 * eye, 0 * eye, eye, eye, rotational=turning)
+    return MechanicalModel(
+        name, recording.response.quantities[0], eye, 0 * eye, 0 * eye, eye, eye, rotational=recording.is_rotational
+    )
 
 
 def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:

@@ -189,18 +189,17 @@ def _fit_rigid_starts(
 
 def _rigid_structure(recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]) -> Structure:
     inputs, outputs = len(recording.command.channels), len(recording.response.channels)
-    quantity, units = recording.response.quantities[0], (*recording.response.units, *recording.command.units)
     return Structure(
         inputs=inputs,
         outputs=outputs,
-        quantity=quantity,
+        quantity=recording.response.quantities[0],
         mass_scale=1.0,
         speed_scale=2 * np.pi * float(np.sqrt(band[0] * band[1])),
         signs=(1.0,) * inputs,
         step_s=1 / recording.sample_rate_hz,
         sensor=settings.sensor,
         actuator=settings.actuator,
-        rotational=any(unit.startswith(("rad", "N m")) for unit in units),
+        rotational=recording.is_rotational,
     )
 
 
