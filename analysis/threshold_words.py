@@ -65,8 +65,3 @@ def _psi(rule: StaircaseRule) -> ThresholdWords:
 def threshold_words(rule: StaircaseRule) -> ThresholdWords:
     """The words for a rule: those of Psi's posterior where the rule is Bayesian, else those of reversals."""
     return _psi(rule) if rule.is_bayesian else REVERSALS
-
-
-def capitalised(words: str) -> str:
-    """At the beginning of a sentence."""
-    return f"{words[0].upper()}{words[1:]}"

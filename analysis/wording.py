@@ -75,6 +75,11 @@ def capitalise(sentence: str) -> str:
     return sentence[:1].upper() + sentence[1:]
 
 
+def as_sentence(text: str) -> str:
+    """The text with a capital and exactly one full stop."""
+    return f"{capitalise(text).rstrip('.')}."
+
+
 def begin_sentence(sentence: str) -> str:
     """The sentence with a capital, unless it begins with the name of a file or an effect."""
     named = any(mark in sentence.partition(" ")[0] for mark in "./\\_")

@@ -22,6 +22,7 @@ from analysis.diagnosis.first_model.model_structures import (
 from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, wants_rigid_model
 from analysis.diagnosis.settings import LEAST_MODEL_ANSWER
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
+from analysis.wording import as_sentence
 from equalizer.effects.simulation.simulator import simulate_response
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
@@ -121,10 +122,7 @@ def fit_first_linear_model(
         "what it could take on itself, such as friction at one level as damping, is not missing from it any more, and "
         "is not named."
     )
-    return widen_tolerance(fit.model), (
-        text,
-        *(f"{remark[:1].upper()}{remark[1:].rstrip('.')}." for remark in fit.remarks),
-    )
+    return widen_tolerance(fit.model), (text, *(as_sentence(remark) for remark in fit.remarks))
 
 
 def _answers(model: MechanicalModel, recording: Recording) -> bool:

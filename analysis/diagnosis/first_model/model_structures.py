@@ -13,6 +13,7 @@ from analysis.diagnosis.data.measured_motion import is_read_as_free, time_unit
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, joint_fit, regressions_of
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
+from analysis.wording import as_sentence
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
 from equalizer.identification.mechanical.open_tolerance import widen_tolerance
@@ -97,10 +98,11 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
         raise NoMotionError("not every command has one measured motion of its own")
     if not any(motion.valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too little of the motion is to be fitted to")
-    rotational = any(unit.startswith(("rad", "N m")) for unit in (*first.response.units, *first.command.units))
-    turns = any(scales_of(motions, axis, rotational).turns for axis in range(count))
+    turns = any(scales_of(motions, axis, first.is_rotational).turns for axis in range(count))
     untimed = not np.isfinite(motions[0].band_hz)
-    return BalancedRecordings(first, regressions_of(motions, turns), untimed, turns, rotational, is_read_as_free(first))
+    return BalancedRecordings(
+        first, regressions_of(motions, turns), untimed, turns, first.is_rotational, is_read_as_free(first)
+    )
 
 
 def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
@@ -144,7 +146,7 @@ def fit_modal_structure(
     if kind == "two-mode" and fit.model.coordinates == axes:
         raise StructureRefused("a mode on an axis does not lower the error on lines that were left out")
     errors = tuple(each.fit if each.held_out is None else each.held_out for each in fit.errors)
-    remarks = (*(f"{text[:1].upper()}{text[1:].rstrip('.')}." for text in fit.remarks),)
+    remarks = tuple(as_sentence(remark) for remark in fit.remarks)
     channels = recordings[0].response.channels
     first = recordings[0]
     model = with_units_of(widen_tolerance(fit.model), first.command.units, first.response.units)

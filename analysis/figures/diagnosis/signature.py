@@ -11,7 +11,7 @@ from analysis.diagnosis.result.findings import Signature
 from analysis.diagnosis.unit_wording import scale_of
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, BLUE, GREY, draw_no_data_note, new_figure, plain_axes
-from analysis.wording import typeset
+from analysis.wording import capitalise, typeset
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
@@ -84,9 +84,9 @@ def _scaled_label(text: str, values: FloatArray) -> tuple[str, float]:
     """ "velocity of x (m/s)" as "Velocity of x (mm/s)", with the factor that goes with it."""
     words, bracket, rest = text.rpartition(" (")
     if not bracket or "/√" in rest or rest.startswith("Hz"):
-        return text[:1].upper() + text[1:], 1.0
+        return capitalise(text), 1.0
     scale = scale_of(rest.removesuffix(")"), float(np.max(np.abs(values))))
-    return f"{words[:1].upper()}{words[1:]} ({scale.unit})", scale.factor
+    return f"{capitalise(words)} ({scale.unit})", scale.factor
 
 
 def _visited_limits(signature: Signature, factor: float) -> tuple[float, float]:
@@ -119,6 +119,6 @@ def _alternative_text(signature: Signature) -> str:
         for end in (0, -1)
     )
     return (
-        f"{signature.of[:1].upper()}{signature.of[1:]} against {signature.along}: from {first} to {last}. The fitted "
+        f"{capitalise(signature.of)} against {signature.along}: from {first} to {last}. The fitted "
         f"law differs from the dots by {share} of their size, rms."
     )

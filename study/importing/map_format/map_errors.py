@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from itertools import islice
 
+from analysis.wording import as_sentence
 from study.errors import StudyError, WrongUseError
 
 _LONGEST_WORD = 60
@@ -54,7 +55,7 @@ def _sentence(problem: str) -> str:
     short = _QUOTED.sub(r"'\1…'", problem)
     if len(short) > _LONGEST_SENTENCE:
         short = f"{short[:_LONGEST_SENTENCE].rpartition('; ')[0] or short[:_LONGEST_SENTENCE]}; and more"
-    return f"{short[:1].upper()}{short[1:].rstrip('.')}."
+    return as_sentence(short)
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from analysis.wording import capitalise
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFit,
@@ -127,7 +128,7 @@ def _fit(
     except MechanicalFitRefused as refusal:
         raise StudyError(
             TITLE,
-            f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.",
+            f"{capitalise(str(refusal))}.",
             "Record more strongly or for longer, or choose another band with --band.",
             saved="Nothing was written.",
         ) from refusal

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.wording import as_sentence, capitalise
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError
 from equalizer.identification.state_space.held_out import HeldOut, validate_on_test
@@ -70,7 +71,7 @@ class IdentifiedDevice:
     def remarks(self) -> tuple[str, ...]:
         """Sentences."""
         known = self.model.quality.remarks if self.model.quality else ()
-        return (*known, *(_sentence(remark) for remark in self.estimate.remarks))
+        return (*known, *(as_sentence(remark) for remark in self.estimate.remarks))
 
 
 def identify_model(plan: IdentifyPlan, on_progress: Callable[[float], None]) -> IdentifiedDevice:
@@ -108,12 +109,8 @@ def _quality(found: IdentifiedRecordings, recordings: Sequence[Recording], teste
     misfit = misfit_of_estimate(identified.model, estimate)
     remarks = (*identified.remarks, *held_out_remarks(tested, identified.cost, misfit, recordings))
     measured = None if tested is None else (tested.error, tested.noise, tested.seconds)
-    sentences = tuple(_sentence(remark) for remark in remarks)
+    sentences = tuple(as_sentence(remark) for remark in remarks)
     return model_quality(misfit.error, identified.scatter, measured, sentences, misfit.most)
-
-
-def _sentence(remark: str) -> str:
-    return f"{remark[:1].upper()}{remark[1:].rstrip('.')}."
 
 
 def check_free(out: Path) -> None:
@@ -195,7 +192,7 @@ def _common_place(recordings: Sequence[Recording]) -> tuple[float, float, float]
 def _no_model(happened: str) -> StudyError:
     return StudyError(
         "No model can be made from these recordings",
-        happened[:1].upper() + happened[1:],
+        capitalise(happened),
         "Record what is missing (hapteq record), or ask for another --band or --order.",
         saved="Nothing was written.",
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.wording import typeset
+from analysis.wording import as_sentence, typeset
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import ModelQuality, worst_quality
 from equalizer.plant.model_response import model_response
@@ -96,7 +96,7 @@ def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: f
     except WorkspaceError as problem:
         numbered = ", ".join(f"{number}: {path.name}" for number, path in enumerate(paths, start=1))
         raise _unfit_error(
-            f"{_sentence(str(problem))} Models are {numbered}.", "Give models that go together."
+            f"{as_sentence(str(problem))} Models are {numbered}.", "Give models that go together."
         ) from problem
 
 
@@ -144,9 +144,9 @@ def _several_places(
         raise WorkspaceError("some models hold the spring they were recorded under and some do not")
     choice = choose_interpolation(workspace, weight=weight)
     at = choice.at(at_m)
-    remarks = [_sentence(choice.reason)]
+    remarks = [as_sentence(choice.reason)]
     outside = place_weights(workspace.places_m, at_m).remark
-    remarks += [_sentence(remark) for remark in dict.fromkeys((*at.remarks, *([outside] if outside else [])))]
+    remarks += [as_sentence(remark) for remark in dict.fromkeys((*at.remarks, *([outside] if outside else [])))]
     if not choice.checks:
         remarks.append("No place could be held out: what the error is between the models' places is not known.")
     held_out = tuple(_held_out_sentence(check) for check in choice.checks)
@@ -232,10 +232,6 @@ def _mm(place_m: Vector | None) -> str:
     return (
         "(place not known)" if place_m is None else f"({', '.join(typeset(f'{1e3 * part:g}') for part in place_m)}) mm"
     )
-
-
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
 def _unfit_error(happened: str, do_now: str) -> StudyError:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.wording import capitalise
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.learning.iteration import IterationState, Repetition, Verdict, begin, next_forces, noise_of_rest
 from equalizer.tracking.learning.model_inverse import compensate_spring
@@ -67,20 +68,21 @@ def repeat_playback(
 
 def _check(plan: RepeatPlan) -> None:
     if plan.settings.hand_on_handle:
-        raise _refusal(
+        raise not_repeated(
             "A person would hold the handle. Repeats learn what one hand did in one play, and play it to the next.",
             "Take the hand off the handle and open the device without one.",
         )
     if plan.repeats < 1:
-        raise _refusal(f"{plan.repeats} repeats were asked for.", "Ask for one or more with --repeat N.")
+        raise not_repeated(f"{plan.repeats} repeats were asked for.", "Ask for one or more with --repeat N.")
     for path in () if plan.out is None else (plan.out, repeats_path(plan.out)):
         if path.exists():
-            raise _refusal(f"{path} exists already, and results are never overwritten.", "Choose another --out.")
+            raise not_repeated(f"{path} exists already, and results are never overwritten.", "Choose another --out.")
     if plan.out is not None and not plan.out.absolute().parent.is_dir():
-        raise _refusal(f"There is no folder {plan.out.parent} to write {plan.out.name} into.", "Make it first.")
+        raise not_repeated(f"There is no folder {plan.out.parent} to write {plan.out.name} into.", "Make it first.")
 
 
-def _refusal(happened: str, do_now: str) -> StudyError:
+def not_repeated(happened: str, do_now: str) -> StudyError:
+    """The error of a refusal before anything moved."""
     return StudyError("Nothing was repeated", happened, do_now, saved="Nothing moved.")
 
 
@@ -107,7 +109,7 @@ def _play_all(
 def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
     signal, rate_hz = plan.wanted.signal, device.info.sample_rate_hz
     if signal.sample_rate_hz != rate_hz:
-        raise _refusal(
+        raise not_repeated(
             f"The trajectory is at {signal.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz.",
             "Resample the trajectory to the device's rate.",
         )
@@ -133,9 +135,7 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
         # After the last row of the table, the model's own forces are played.
         return begin(repetition, np.vstack([plan.first, invert(inside)[len(signal) :]]))
     except ValueError as error:
-        raise _refusal(
-            f"{str(error)[:1].upper()}{str(error)[1:]}.", "Make the trajectory smaller, or correct it."
-        ) from error
+        raise not_repeated(f"{capitalise(str(error))}.", "Make the trajectory smaller, or correct it.") from error
 
 
 def _write_best(plan: RepeatPlan, states: list[IterationState], played: list[Played]) -> str:

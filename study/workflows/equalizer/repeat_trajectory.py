@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.wording import capitalise
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
@@ -14,7 +15,6 @@ from equalizer.tracking.learning.iteration import LOWEST_GAIN, Verdict, largest_
 from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.workspace.convergence_at_place import convergence_at
 from equalizer.tracking.workspace.feedforward_at_place import inverse_at
-from study.errors import StudyError
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.formats.repeats_file import repeats_path
 from study.workflows.equalizer.equalize_trajectory import (
@@ -30,7 +30,7 @@ from study.workflows.equalizer.play_forces import (
     require_device_alone,
 )
 from study.workflows.equalizer.playback_models import PlaybackModels
-from study.workflows.equalizer.repeat_playback import OnProgress, repeat_playback
+from study.workflows.equalizer.repeat_playback import OnProgress, not_repeated, repeat_playback
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, earlier_forces
 
 SAFE_SHARE = 0.9
@@ -68,7 +68,7 @@ def repeat_trajectory(
     solved = solve_trajectory(plan)
     _require_repeatable(solved.models)
     if solved.solved.loss is not None:
-        raise _refusal(
+        raise not_repeated(
             "The forces are at the cap already, so that there is no room to correct them.",
             "Scale the accelerations, or leave out --constrain or --repeat.",
         )
@@ -119,7 +119,7 @@ def repeat_lines(done: RepeatedTrajectory) -> tuple[str, ...]:
         lines.append(f"Play {number}: error {100 * error:.2f} % as measured{kept}.")
     lines.append(f"Noise alone: {100 * found.noise_floor:.2f} %. {_verdict(done)}")
     if found.remark:
-        lines.append(f"{found.remark[:1].upper()}{found.remark[1:]}.")
+        lines.append(f"{capitalise(found.remark)}.")
     strongest = f"The highest of the kept forces is {_peak_n(found):.3g} N"
     return (*lines, f"{strongest}; they are for the device under the spring that they were played under.")
 
@@ -132,7 +132,7 @@ def _verdict(done: RepeatedTrajectory) -> str:
     found = done.repeated
     if found.verdict is Verdict.BEST_KEPT and len(found.errors) > done.order.repeats:
         return "All repeats were played; the best forces are kept."
-    return f"{found.verdict.value[:1].upper()}{found.verdict.value[1:]}."
+    return f"{capitalise(found.verdict.value)}."
 
 
 def _convergence_line(done: RepeatedTrajectory) -> str:
@@ -146,7 +146,7 @@ def _convergence_line(done: RepeatedTrajectory) -> str:
 
 def _require_repeatable(models: PlaybackModels) -> None:
     if models.two is not None:
-        raise _refusal(
+        raise not_repeated(
             "Two bands of one place were given, and what is felt of the upper one is no waveform to be corrected.",
             "Give the one model whose band shall be repeated.",
         )
@@ -159,7 +159,7 @@ def _gain(tested: Convergence | None) -> float:
         return 1.0
     gain = min(1.0, SAFE_SHARE * tested.safe_beta)
     if gain < LOWEST_GAIN:
-        raise _refusal(
+        raise not_repeated(
             f"Repeats would not converge: at {tested.worst_hz:.1f} Hz {tested.surviving.max():.2f} of an error can "
             "survive each, by what the device may be within the models.",
             "Record and identify at the place itself, or with more sweeps.",
@@ -179,7 +179,3 @@ def _initial_forces(solved: EqualizedTrajectory, order: RepeatOrder, spring: Vir
     held = compensate_spring(lambda _: np.zeros_like(forces), spring, rate_hz, band_hz)(wanted)
     # Forces at the cap leave no room to carry the spring too; what then lacks is an error like any other.
     return forces + largest_share(forces, held, solved.plan.cap_n) * held
-
-
-def _refusal(happened: str, do_now: str) -> StudyError:
-    return StudyError("Nothing was repeated", happened, do_now, saved="Nothing moved.")

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from analysis.wording import capitalise
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, TableError, require_rate
@@ -66,7 +67,7 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
         controller = realtime_controller(model, wanted, plan.settings)
         cases = controller_cases(controller)
     except (TrackingError, TableError) as problem:
-        raise _refusal(_sentence(problem), "Correct what it says, or choose another model.") from problem
+        raise _refusal(f"{capitalise(str(problem))}.", "Correct what it says, or choose another model.") from problem
     exported = ExportedController(plan, model, controller)
     sources = (header_text(controller, _origin(plan, model)), example_text(), check_text(cases))
     plan.out.mkdir()
@@ -82,7 +83,7 @@ def controller_settings(weight: float, preview_s: float, cap_n: float) -> Realti
     try:
         return RealtimeSettings(weight, preview_s, cap_n)
     except TrackingError as problem:
-        raise _refusal(_sentence(problem), TRY) from problem
+        raise _refusal(f"{capitalise(str(problem))}.", TRY) from problem
 
 
 def exported_summary(exported: ExportedController) -> dict[str, Any]:
@@ -152,10 +153,6 @@ def _origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str, ...]:
         f"Forces {', '.join(model.input_channels)} in N; accelerations {', '.join(model.output_channels)} in m/s^2.",
         f"The transient: {table}. Weight {plan.settings.weight:g}.",
     )
-
-
-def _sentence(problem: Exception) -> str:
-    return f"{str(problem)[:1].upper()}{str(problem)[1:]}."
 
 
 def _refusal(happened: str, do_now: str) -> StudyError:
