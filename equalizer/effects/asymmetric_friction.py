@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import regress_beside_linear, sliding_motion
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _GUESS = 1.3
@@ -17,10 +16,6 @@ _GUESS = 1.3
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return float(friction_force(parameters[0], parameters[1], memory[0], memory, at))
-
-
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["level_positive"], values["level_negative"]])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -44,7 +39,7 @@ EFFECT = Effect(
     signature="the missing force flips its sign with the velocity, by unequal amounts: there is a mean force while "
     "the axis moves; its odd harmonics, and weaker even ones, fall as the level rises",
     parameters=(Parameter("level_positive", 1e-9, 1e6, none=0.0), Parameter("level_negative", 1e-9, 1e6, none=0.0)),
-    acts=AxisForce(_law, _pack, memory=1),
+    acts=AxisForce(_law, pack_values("level_positive", "level_negative"), memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )

@@ -1,13 +1,10 @@
 """Quadratic stiffness: a spring that is stiffer in one direction than in the other."""
 
-import numpy as np
-
-from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
@@ -25,10 +22,6 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return float(force)
 
 
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["k2"]])
-
-
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     motion = axis_motion(evidence, axis)
     k2 = float(regress_beside_linear(motion).fit(-(motion.position**2)).strengths[0])
@@ -42,6 +35,6 @@ EFFECT = Effect(
     signature="the missing force is an even curve over the position; its even harmonics rise with the level and the "
     "mean position moves",
     parameters=(Parameter("k2", -1e12, 1e12, none=0.0, scale="signed"),),
-    acts=AxisForce(_law, _pack),
+    acts=AxisForce(_law, pack_values("k2")),
     starts=_starts,
 )

@@ -104,7 +104,7 @@ EFFECT = Effect(
         Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),
         Parameter("with_position", 0.0, 1.0, none=None, scale="linear", step=1.0, fixed=True),
     ),
-    acts=OnResponse(_read_drifting, stage=4, shared=True, on_position=_read_position),
+    acts=OnResponse(_read_drifting, stage=4, on_position=_read_position),
     starts=_starts,
     of_time=True,
     sites=("all",),

@@ -2,21 +2,16 @@
 
 import numpy as np
 
-from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, linear_part
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return float(parameters[0])
-
-
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["force"]])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -34,6 +29,6 @@ EFFECT = Effect(
     source="weight, or the pull of a cable",
     signature="the missing force is the same everywhere and at every level; the place of rest is another",
     parameters=(Parameter("force", -1e6, 1e6, none=0.0, scale="signed"),),
-    acts=AxisForce(_law, _pack),
+    acts=AxisForce(_law, pack_values("force")),
     starts=_starts,
 )

@@ -7,22 +7,17 @@ rest.
 
 import numpy as np
 
-from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import regress_beside_linear, sliding_motion
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return float(friction_force(parameters[0], parameters[0], memory[0], memory, at))
-
-
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["level"]])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -38,6 +33,6 @@ EFFECT = Effect(
     signature="the missing force flips its sign with the velocity and does not grow with it; its odd harmonics fall "
     "as the level rises",
     parameters=(Parameter("level", 1e-9, 1e6, none=0.0),),
-    acts=AxisForce(_law, _pack, memory=1),
+    acts=AxisForce(_law, pack_values("level"), memory=1),
     starts=_starts,
 )

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 from weakref import WeakValueDictionary
 
+import numpy as np
+
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.law import Law
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -87,6 +89,11 @@ class JointForce:
     acceleration: bool = False
 
 
+def pack_values(*names: str) -> Callable[[MechanicalModel, int, Values], FloatArray]:
+    """A `pack` of the values themselves, in this order."""
+    return lambda model, axis, values: np.array([values[name] for name in names])
+
+
 @dataclass(frozen=True, slots=True)
 class OnCommand:
     """Changes one channel of the command."""
@@ -109,12 +116,8 @@ class OnResponse:
 
     change: Callable[[FloatArray, float, tuple[int, ...], Values], FloatArray]
     """Arguments: samples (n, p), sample rate in Hz, indices of the affected channels, values."""
-    after_filter: bool = True
-    """Whether it is applied after the sensor's low pass."""
     stage: int = 0
-    """Order among the effects on one side of the low pass: alignment, range, added signals, number format, clock."""
-    shared: bool = False
-    """Whether the effect acts on all channels together; it cannot act on a single one."""
+    """Order among the effects, all after the low pass: alignment, range, added signals, number format, clock."""
     of_whole: bool = False
     """Whether it depends on the recording's length, which must then be given for an excerpt."""
     bandwidth_hz: Callable[[float, Values], float] | None = None

@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 LEAST_TRAVEL_RAD = 0.5
@@ -22,10 +21,6 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
         torque = -0.5 * parameters[0] * (start + np.sin(at[X_FREE] + at[X_PER_N] * torque + parameters[1]))
     at[F_END] = -parameters[0] * np.sin(at[X_FREE] + at[X_PER_N] * torque + parameters[1])
     return float(torque)
-
-
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["torque"], values["angle"]])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -47,6 +42,6 @@ EFFECT = Effect(
         Parameter("torque", 1e-9, 1e6, none=0.0),
         Parameter("angle", -1e3, 1e3, none=None, scale="linear", step=0.02),
     ),
-    acts=AxisForce(_law, _pack),
+    acts=AxisForce(_law, pack_values("torque", "angle")),
     starts=_starts,
 )

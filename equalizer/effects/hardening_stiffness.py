@@ -1,13 +1,10 @@
 """Cubic (Duffing) stiffness: a spring that stiffens with deflection in either direction."""
 
-import numpy as np
-
-from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
@@ -24,10 +21,6 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return float(force)
 
 
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["k3"]])
-
-
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     motion = axis_motion(evidence, axis)
     k3 = float(regress_beside_linear(motion).fit(-(motion.position**3)).strengths[0])
@@ -41,6 +34,6 @@ EFFECT = Effect(
     signature="the missing force is an odd curve over the position; its odd harmonics rise with the level and the "
     "lowest resonance moves up",
     parameters=(Parameter("k3", -1e15, 1e15, none=0.0, scale="signed"),),
-    acts=AxisForce(_law, _pack),
+    acts=AxisForce(_law, pack_values("k3")),
     starts=_starts,
 )

@@ -48,7 +48,7 @@ EFFECT = Effect(
         Parameter("offset", -LONGEST_S, LONGEST_S, none=0.0, scale="linear", step=1e-5),
         Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),
     ),
-    acts=OnResponse(_read_shifted, stage=4, shared=True),
+    acts=OnResponse(_read_shifted, stage=4),
     starts=_starts,
     sites=("all",),
 )

@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values
+from equalizer.effects.effect import Effect, JointForce, Parameter, PlacedEffect, Values, pack_values
 from equalizer.effects.simulation.bodies import bodies_of, simulate_bodies
 from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.dry_friction_kernel import friction_force
@@ -89,10 +89,6 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[Mechanic
     return model, joint_direction(model, axis)
 
 
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["gap"], values["stiffness"], values["slip"]])
-
-
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """The two best of a coarse grid, by the error of a simulation of an excerpt: first gaps and stiffnesses, with a
     medium slip force, then slip forces."""
@@ -153,6 +149,6 @@ EFFECT = Effect(
         Parameter("stiffness", 1e-6, 1e12, none=0.0),
         Parameter("slip", 1e-9, 1e6, none=0.0),
     ),
-    acts=JointForce(_change, _law, _pack, memory=1, steps=STEPS),
+    acts=JointForce(_change, _law, pack_values("gap", "stiffness", "slip"), memory=1, steps=STEPS),
     starts=_starts,
 )

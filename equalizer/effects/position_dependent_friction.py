@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.instant import X_FREE, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import regress_beside_linear, sliding_motion
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
@@ -18,10 +17,6 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     mean = 0.5 * (at[X] + at[X_FREE])
     level = max(parameters[0] * (1 + parameters[1] * mean + parameters[2] * mean * mean), 0.0)
     return float(friction_force(level, level, memory[0], memory, at))
-
-
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["level"], values["slope_per_m"], values["bend_per_m2"]])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
@@ -44,7 +39,7 @@ EFFECT = Effect(
         Parameter("slope_per_m", -1e6, 1e6, none=None, scale="signed"),
         Parameter("bend_per_m2", -1e9, 1e9, none=None, scale="signed"),
     ),
-    acts=AxisForce(_law, _pack, memory=1),
+    acts=AxisForce(_law, pack_values("level", "slope_per_m", "bend_per_m2"), memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )

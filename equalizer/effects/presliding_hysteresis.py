@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, best_trial, regress_beside_linear
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 BENDS = np.geomspace(3e-4, 1.0, 15)
@@ -44,10 +43,6 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return float(-stiffness * ((1 - late) * start + late * bend))
 
 
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["level"], values["stiffness"]])
-
-
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     motion = axis_motion(evidence, axis)
     path, used = evidence.axis_position[:, axis], evidence.used > 0
@@ -67,7 +62,7 @@ EFFECT = Effect(
     signature="the missing force flips its sign with the velocity only after some travel: a loop over the position "
     "near each reversal",
     parameters=(Parameter("level", 1e-9, 1e6, none=0.0), Parameter("stiffness", 1e-3, 1e9, none=None, step=0.03)),
-    acts=AxisForce(_law, _pack, memory=1),
+    acts=AxisForce(_law, pack_values("level", "stiffness"), memory=1),
     starts=_starts,
     simpler=("coulomb_friction",),
 )

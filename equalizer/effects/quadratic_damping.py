@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
+from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.instant import F_END, V_FREE, V_PER_N, V
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, regress_beside_linear
-from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 
@@ -22,10 +21,6 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     return float(-0.5 * parameters[0] * (at[V] * abs(at[V]) + end * abs(end)))
 
 
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    return np.array([values["coefficient"]])
-
-
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     motion = axis_motion(evidence, axis)
     coefficient = float(regress_beside_linear(motion).fit(-motion.velocity * np.abs(motion.velocity)).strengths[0])
@@ -38,6 +33,6 @@ EFFECT = Effect(
     source="Newton's drag at high Reynolds numbers",
     signature="the missing force is a parabola over the velocity, odd; its odd harmonics rise with the level",
     parameters=(Parameter("coefficient", 1e-9, 1e9, none=0.0),),
-    acts=AxisForce(_law, _pack),
+    acts=AxisForce(_law, pack_values("coefficient")),
     starts=_starts,
 )

@@ -79,7 +79,7 @@ EFFECT = Effect(
     signature="each channel reads a constant share of the others at every frequency and level, with opposite signs "
     "both ways, while the position agrees",
     parameters=tuple(Parameter(name, -LARGEST_DEG, LARGEST_DEG, none=0.0, scale="linear", step=0.05) for name in ABOUT),
-    acts=OnResponse(_rotate_response, stage=-2, shared=True),
+    acts=OnResponse(_rotate_response, stage=-2),
     starts=_starts,
     sites=("all",),
     report=_report,

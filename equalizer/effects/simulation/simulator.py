@@ -151,22 +151,18 @@ def _apply_sensor(
 ) -> SimulationResult:
     on_response = [(placed.effect.acts, placed) for placed in effects if isinstance(placed.effect.acts, OnResponse)]
     on_response.sort(key=lambda item: item[0].stage)
-    response, position = played.response, played.position
-    for after_filter in (False, True):
-        if after_filter:
-            response = _low_pass_channels(response, sample_rate_hz, _bandwidths(model, response.shape[1], on_response))
-        for acts, placed in on_response:
-            if acts.after_filter is not after_filter:
-                continue
-            before = response
-            if measurement is not None and acts.given is not None:
-                response = acts.given(response, measurement.response, measurement.noise, placed.sites, placed.values)
-            else:
-                response = _change_response(acts, placed, response, sample_rate_hz, measurement)
-            if acts.on_position is not None:
-                position = acts.on_position(position, sample_rate_hz, placed.values)
-            if measurement is not None and measurement.position is not None and acts.given_position is not None:
-                position = acts.given_position(before, response, position, measurement.position)
+    bandwidths = _bandwidths(model, played.response.shape[1], on_response)
+    response, position = _low_pass_channels(played.response, sample_rate_hz, bandwidths), played.position
+    for acts, placed in on_response:
+        before = response
+        if measurement is not None and acts.given is not None:
+            response = acts.given(response, measurement.response, measurement.noise, placed.sites, placed.values)
+        else:
+            response = _change_response(acts, placed, response, sample_rate_hz, measurement)
+        if acts.on_position is not None:
+            position = acts.on_position(position, sample_rate_hz, placed.values)
+        if measurement is not None and measurement.position is not None and acts.given_position is not None:
+            position = acts.given_position(before, response, position, measurement.position)
     response = clip_to_range(response, model.sensor.range)
     return SimulationResult(response, position, played.axis_position, played.axis_velocity, played.axis_force)
 
