@@ -166,7 +166,7 @@ class BandedEqualizer:
         if self.low is None:
             return np.zeros((len(wanted), self.middle.B.shape[1])), None
         motion = self._plan_motion(wanted, self.low.corner_hz)
-        return low_band_forces(motion, self.low.rigid, self._rate_hz).total, motion
+        return low_band_forces(motion, self.low.rigid, self._rate_hz), motion
 
     def _high_forces(self, wanted: FloatArray, others: FloatArray) -> tuple[HighBandForces | None, StylusShare | None]:
         if self.high is None:

@@ -1,9 +1,4 @@
-"""The low band: a slow motion is planned, and its forces follow from the inverse dynamics of a rigid model.
-
-In this band the environment is rendered in a closed loop: the forces of springs and walls depend on the handle's
-position. Playback is superposed, so the added force is the model's force along the planned motion less that of the
-rendered spring.
-"""
+"""The low band: a slow motion is planned, and its forces follow from the inverse dynamics of a rigid model."""
 
 from dataclasses import dataclass
 
@@ -12,7 +7,6 @@ from scipy.signal import lfilter
 
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.bands.rigid_model import RigidModel
-from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
 CORNER_HZ = 0.5
 """High-pass corner: a constant acceleration would move the handle out of its workspace."""
@@ -31,17 +25,6 @@ class SlowMotion:
     def travel_m(self) -> float:
         """Largest distance from the starting position."""
         return float(np.linalg.norm(self.position_m, axis=1).max(initial=0.0))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LowBandForces:
-    """Forces of the low band along its planned motion, with and without the rendered spring's share."""
-
-    total: FloatArray
-    """(N, m), N: force that must enter the device along the motion."""
-    superposed: FloatArray
-    """(N, m), N: command; with the rendered spring's force it gives `total`."""
-    motion: SlowMotion
 
 
 def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
@@ -73,18 +56,17 @@ def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: f
     return SlowMotion(position, velocity, a - 2 * corner * velocity_like + corner**2 * position)
 
 
-def low_band_forces(
-    motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float, spring: VirtualSpring = NO_SPRING
-) -> LowBandForces:
-    """Inverse dynamics along the motion, advanced by the rigid model's delay to first order, which is enough for a slow
-    band."""
+def low_band_forces(motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float) -> FloatArray:
+    """Forces (N, m) in N by inverse dynamics along the motion, advanced by the rigid model's delay to first order,
+    which is enough for a slow band."""
     early = rigid.delay_s + 0.5 / sample_rate_hz
     x, v, a = motion.position_m, motion.velocity_m_s, motion.acceleration
     later_x, later_v = x + early * v, v + early * a
     later_a = a + early * np.gradient(a, 1 / sample_rate_hz, axis=0) if len(a) > 1 else a
-    total = later_a @ rigid.mass_kg.T + later_v @ rigid.damping_n_s_per_m.T + later_x @ rigid.stiffness_n_per_m.T
-    rendered = -(spring.stiffness_n_per_m * x + spring.damping_n_s_per_m * v)
-    return LowBandForces(total, total - rendered, motion)
+    force: FloatArray = (
+        later_a @ rigid.mass_kg.T + later_v @ rigid.damping_n_s_per_m.T + later_x @ rigid.stiffness_n_per_m.T
+    )
+    return force
 
 
 def _corner_rad_per_s(corner_hz: float, sample_rate_hz: float) -> float:

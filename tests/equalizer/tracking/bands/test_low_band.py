@@ -42,7 +42,7 @@ def test_the_synthetic_device_plays_the_planned_acceleration(plants, slow):
     device, lines = plants.omega_like(), np.arange(0.5, 4.05, 0.1)
     rigid = fit_rigid_model(lines, device.response(lines), RATE_HZ)
     motion = plan_motion(slow, RATE_HZ, 0.1)
-    played = device.play(low_band_forces(motion, rigid, RATE_HZ).total)
+    played = device.play(low_band_forces(motion, rigid, RATE_HZ))
     assert np.linalg.norm(played - motion.acceleration) < 0.01 * np.linalg.norm(slow)
     assert np.linalg.norm(played - slow) < 0.01 * np.linalg.norm(slow)
 
@@ -51,7 +51,8 @@ def test_superposed_on_a_rendered_spring_a_free_mass_makes_the_planned_motion(sl
     mass_kg, spring = 0.3, VirtualSpring(120.0, 2.0)
     rigid = RigidModel(mass_kg * np.eye(3), np.zeros((3, 3)), np.zeros((3, 3)))
     motion = plan_motion(slow, RATE_HZ)
-    added = low_band_forces(motion, rigid, RATE_HZ, spring).superposed
+    rendered = -(spring.stiffness_n_per_m * motion.position_m + spring.damping_n_s_per_m * motion.velocity_m_s)
+    added = low_band_forces(motion, rigid, RATE_HZ) - rendered
     position, velocity, made = np.zeros(3), np.zeros(3), np.empty_like(slow)
     for k, force in enumerate(added):
         made[k] = position
