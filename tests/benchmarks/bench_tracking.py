@@ -1,10 +1,12 @@
 """The forms of the tracker against each other: 0.5 s at 1 kHz, three axes, order 26; growth; what a tick costs."""
 
 import ctypes
+import importlib.util
 import sys
 import time
 import timeit
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from numba import njit
@@ -15,8 +17,12 @@ from equalizer.tracking.lqr.changing_direction import TurningTransient, turning_
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.riccati import backward_gains
 from equalizer.tracking.lqr.rotation import normal_basis, rotation_basis
-from equalizer.tracking.lqr.toeplitz import least_squares_forces
 from equalizer.tracking.lqr.tracking_problem import TrackingProblem, TrackingWeights, make_tracking_problem
+
+_DENSE = Path(__file__).parents[1] / "equalizer" / "tracking" / "lqr" / "dense_least_squares.py"
+_spec = importlib.util.spec_from_file_location(_DENSE.stem, _DENSE)
+dense_least_squares = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(dense_least_squares)
 
 ORDER, SAMPLES = 26, 500
 NEEDED = {"stored gains": (10.0, 100.0), "rotation basis": (500.0, 5000.0)}
@@ -74,7 +80,7 @@ def forms(order: int, samples: int, dense: bool) -> dict[str, tuple[Callable[[],
         "basis of a normal": (lambda: three.forces(axes[0]), 10_000),
     }
     if dense:
-        every["dense least squares"] = (lambda: least_squares_forces(problem, wanted), 1)
+        every["dense least squares"] = (lambda: dense_least_squares.least_squares_forces(problem, wanted), 1)
     return every
 
 

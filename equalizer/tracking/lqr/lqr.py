@@ -18,7 +18,8 @@ No measured signal is fed back. The gains act on the state of the simulated mode
 zero" could be read, gives an error of about the size of the trajectory.
 
 References: Bryson and Ho, Applied Optimal Control (1975), chapter 5; Anderson and Moore, Optimal Control: Linear
-Quadratic Methods (1990), chapter 4. `toeplitz` computes the same forces by one dense least-squares problem.
+Quadratic Methods (1990), chapter 4. The tests compute the same forces by one dense least-squares problem
+(`tests/equalizer/tracking/lqr/dense_least_squares.py`).
 """
 
 from dataclasses import dataclass

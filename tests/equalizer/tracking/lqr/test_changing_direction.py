@@ -13,8 +13,8 @@ from equalizer.tracking.lqr.changing_direction import (
 )
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.rotation import rotation_basis
-from equalizer.tracking.lqr.toeplitz import least_squares_forces
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
+from tests.equalizer.tracking.lqr.dense_least_squares import least_squares_forces
 
 N = 120
 

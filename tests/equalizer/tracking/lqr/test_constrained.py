@@ -4,8 +4,8 @@ from scipy.optimize import minimize
 
 from equalizer.tracking.lqr.constrained import CapSettings, track_under_cap
 from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.toeplitz import block_toeplitz
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
+from tests.equalizer.tracking.lqr.dense_least_squares import block_toeplitz
 
 
 def walk(samples, seed):

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.toeplitz import block_toeplitz, least_squares_forces
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
+from tests.equalizer.tracking.lqr.dense_least_squares import block_toeplitz, least_squares_forces
 
 AGREEMENT = {1.0: 1e-10, 1e-2: 1e-10, 1e-4: 1e-10, 1e-6: 1e-9}
 
