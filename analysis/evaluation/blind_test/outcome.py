@@ -21,29 +21,50 @@ class Concealed:
     values: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """A case of a bank: the concealed effects, the diagnosis, and its errors."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnsweredCase:
+    """A case of a sealed bank with its diagnosis and its errors."""
 
     number: int
     seed: int
     kind: str
-    """nothing, single, pair, outside (the catalogue) or without (the true effect was not to be considered)."""
-    bank: str
-    """main, dirty (more hidden extras) or engine (a second physics engine)."""
     axes: tuple[str, ...]
-    model: str
-    """Origin of the model: calibrated, or re-tuned to the device."""
-    concealed: tuple[Concealed, ...]
-    strengths: tuple[float, ...]
-    """0 = the weakest that is drawn, 1 = the strongest."""
     adds: float
-    """Change of the readings by the concealed effects, simulated: rms over the noise's rms, in the worst channel."""
+    """Change of the readings by what is concealed, simulated: rms over the noise's rms, in the worst channel."""
     diagnosis: Diagnosis | None
     """The diagnosis; None: it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
     """Rms error on held-out samples over the noise's rms: by stage ("before", "retuned", "after"), then by channel."""
     seconds: float
+
+    @property
+    def verdict(self) -> str:
+        """The diagnosis' verdict; "failed" where there is no diagnosis."""
+        return "failed" if self.diagnosis is None else self.diagnosis.verdict
+
+    @property
+    def detectable(self) -> bool:
+        """Whether the re-tuned model leaves a detectable error; a failed diagnosis counts as if it did."""
+        return self.diagnosis is None or self.left("retuned") > DETECTABLE
+
+    def left(self, stage: str) -> float:
+        """Rms error on held-out samples over the noise's rms, in the worst channel; NaN where it is not known. stage:
+        "before", "retuned" or "after"."""
+        return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome(AnsweredCase):
+    """A case of a bank of effects. kind: nothing, single, pair, outside (the catalogue) or without (the true effect was
+    not to be considered)."""
+
+    bank: str
+    """main, dirty (more hidden extras) or engine (a second physics engine)."""
+    model: str
+    """Origin of the model: calibrated, or re-tuned to the device."""
+    concealed: tuple[Concealed, ...]
+    strengths: tuple[float, ...]
+    """0 = the weakest that is drawn, 1 = the strongest."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -61,16 +82,6 @@ class Outcome:
         return tuple(each.effect for each in self.named)
 
     @property
-    def verdict(self) -> str:
-        """The diagnosis' verdict; "failed" where there is no diagnosis."""
-        return "failed" if self.diagnosis is None else self.diagnosis.verdict
-
-    @property
-    def detectable(self) -> bool:
-        """Whether the re-tuned model leaves a detectable error; a failed diagnosis counts as if it did."""
-        return self.diagnosis is None or self.left("retuned") > DETECTABLE
-
-    @property
     def seen_by_ideal_observer(self) -> bool:
         """Whether the effects show in a simulation of the same device with and without them, before a re-tuned model
         hides part of them: their change and the independent noise add up in power."""
@@ -85,8 +96,3 @@ class Outcome:
     def returned(self) -> tuple[str, ...]:
         """The set of effects that the diagnosis holds for possible; empty where it failed."""
         return () if self.diagnosis is None else self.diagnosis.returned_set
-
-    def left(self, stage: str) -> float:
-        """Rms error on held-out samples over the noise's rms, in the worst channel; NaN where it is not known. stage:
-        "before", "retuned" or "after"."""
-        return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))

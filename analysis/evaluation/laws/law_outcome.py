@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect
-from analysis.evaluation.blind_test.outcome import DETECTABLE
+from analysis.diagnosis.document import Candidate, NamedEffect
+from analysis.evaluation.blind_test.outcome import AnsweredCase
 from equalizer.effects.discovered_law import has_memory
 from equalizer.laws.law import Law, law_of
 
@@ -27,24 +27,12 @@ class TrueLaw:
     numbers: Mapping[str, float]
 
 
-@dataclass(frozen=True, slots=True)
-class LawOutcome:
-    """A case of a bank of laws: what was concealed, the diagnosis, and its errors."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawOutcome(AnsweredCase):
+    """A case of a bank of laws. kind: law, nothing, decoy (an effect of the catalogue) or mode (a linear one)."""
 
-    number: int
-    seed: int
-    kind: str
-    """law, nothing, decoy (an effect of the catalogue) or mode (a linear one)."""
     concealed: str
-    axes: tuple[str, ...]
     truth: TrueLaw | None
-    adds: float
-    """Change of the readings by the law: rms over the noise's, in the worst channel."""
-    diagnosis: Diagnosis | None
-    """The diagnosis; None: it failed."""
-    channel_errors: Mapping[str, Mapping[str, float]]
-    """Rms error on held-out samples over the noise's rms: by stage ("before", "retuned", "after"), then by channel."""
-    seconds: float
     errors: tuple[float, ...] = ()
     """Error of the reported laws (`law_error`): in the visited range, and at a higher level."""
 
@@ -69,21 +57,6 @@ class LawOutcome:
         return (
             () if self.diagnosis is None else tuple(each.effect for each in self.diagnosis.effects if each.law is None)
         )
-
-    @property
-    def verdict(self) -> str:
-        """The diagnosis' verdict; "failed" where there is no diagnosis."""
-        return "failed" if self.diagnosis is None else self.diagnosis.verdict
-
-    def left(self, stage: str) -> float:
-        """Rms error on held-out samples over the noise's rms, in the worst channel; NaN where it is not known. stage:
-        "before", "retuned" or "after"."""
-        return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))
-
-    @property
-    def shows(self) -> bool:
-        """Whether the re-tuned model leaves a detectable error; a failed diagnosis counts as if it did."""
-        return self.diagnosis is None or self.left("retuned") > DETECTABLE
 
     @property
     def structured(self) -> bool:
@@ -116,7 +89,7 @@ class LawOutcome:
         that shows with another structure or function, or not at all."""
         if self.diagnosis is None or self.false_law or self.wrongly_explained:
             return True
-        return self.truth is not None and self.shows and not (self.structured and self.close)
+        return self.truth is not None and self.detectable and not (self.structured and self.close)
 
 
 def _collect_laws(found: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[Law, ...]:

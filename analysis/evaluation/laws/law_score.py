@@ -21,12 +21,12 @@ def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
     """Score of a bank: rates over cases with a law, with nothing missing and with decoys, and median processor
     seconds."""
     laws = [each for each in outcomes if each.truth is not None]
-    shown = [each for each in laws if each.shows]
+    shown = [each for each in laws if each.detectable]
     nulls = [each for each in outcomes if each.kind == "nothing"]
     others = [each for each in outcomes if each.kind in ("decoy", "mode")]
     with_names = [each for each in shown if each.named]
     figures = (
-        share("laws that show", laws, lambda each: each.shows),
+        share("laws that show", laws, lambda each: each.detectable),
         share("of these a law is named", shown, lambda each: bool(each.named)),
         share("a law is named or a candidate", shown, lambda each: bool(each.laws)),
         share("structure right, named or a candidate", shown, lambda each: each.structured),

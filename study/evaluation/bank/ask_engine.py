@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
 
 from study.errors import StudyError
-from study.evaluation.bank.proof_folder import ANSWER, DIED, RECORDING, ProofFolder
+from study.evaluation.bank.proof_folder import ANSWER, DIED, FURTHER, RECORDING, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
 from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.text_file import read_text, write_text
@@ -95,6 +95,30 @@ def _ask_process(process: "subprocess.Popen[str]", name: str) -> bool:
 
 Workers = int | Executor
 """Number of processes on this computer, or an executor to whose workers the cases are sent: they may share no disk."""
+
+
+def ask_and_count(
+    folder: ProofFolder,
+    names: Sequence[str],
+    workers: Workers,
+    on_done: Callable[[int, int], None],
+    *,
+    keep: bool,
+    asked: Sequence[str] | None = None,
+) -> None:
+    """Diagnose the cases that have no answer, calling `on_done(answered, total)`. keep: keep recordings after they are
+    answered. asked: those of `names` that can be asked; None = all. Raises StudyError as `ask_engine`."""
+    done = sum(is_answered(folder.open / name) for name in names)
+    on_done(done, len(names))
+
+    def on_answered(name: str) -> None:
+        nonlocal done
+        done += 1
+        if not keep:
+            forget_recordings(folder.open / name)
+        on_done(done, len(names))
+
+    ask_engine(folder, names if asked is None else asked, workers, on_answered)
 
 
 def ask_engine(folder: ProofFolder, names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]) -> None:
@@ -203,9 +227,10 @@ def _write_failure(place: Path) -> None:
     write_text(place / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
-def forget_recording(place: Path) -> None:
-    """Delete the recording of an answered case to save disk space; the label keeps its hash, and the seed can draw
-    it again."""
+def forget_recordings(place: Path) -> None:
+    """Delete the recordings of an answered case to save disk space; the label keeps their hash, and the seed can draw
+    them again."""
     if is_answered(place):
-        with suppress(OSError):
-            (place / RECORDING).unlink(missing_ok=True)
+        for path in (place / RECORDING, *place.glob(FURTHER.format("*"))):
+            with suppress(OSError):
+                path.unlink(missing_ok=True)

@@ -17,9 +17,9 @@ from analysis.diagnosis.next_experiment.experiment_menu import Experiment, exper
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from study.evaluation.bank.answer_cases import others_sha256
-from study.evaluation.bank.ask_engine import Workers, ask_engine, forget_recording, is_answered
+from study.evaluation.bank.ask_engine import Workers, ask_and_count
 from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
-from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_folder import FURTHER, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redraw_recording
 from study.evaluation.challenge.drive_plan import RATE_HZ
@@ -30,8 +30,6 @@ from study.store.formats.recording_file import write_recording
 
 NEXT = "next"
 """Folder of the follow-up cases: a bank of its own, whose labels name the case they follow."""
-FURTHER = "recording_{}.h5"
-"""File of a further recording, by its number."""
 PROPOSED, DRAWN = "proposed", "drawn"
 NOISE_SEED = 7
 """Keeps the noise and the random order of follow-ups apart from all other draws of a case."""
@@ -61,19 +59,7 @@ def follow_up(
     seal(again)
     labels = [read_label(again.label(each.number)) for each in starts]
     names = [label[which]["name"] for label in labels for which in (PROPOSED, DRAWN) if which in label]
-    done = sum(is_answered(again.open / name) for name in names)
-    on_done(done, len(names))
-
-    def on_answered(name: str) -> None:
-        nonlocal done
-        done += 1
-        if not keep:
-            forget_recording(again.open / name)
-            for further in (again.open / name).glob(FURTHER.format("*")):
-                further.unlink()
-        on_done(done, len(names))
-
-    ask_engine(again, names, workers, on_answered)
+    ask_and_count(again, names, workers, on_done, keep=keep)
     return tuple(_follow_up_outcome(again, each, label) for each, label in zip(starts, labels, strict=True))
 
 

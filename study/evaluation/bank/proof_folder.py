@@ -49,6 +49,8 @@ class ProofFolder:
 
 RECORDING, MODEL, SETTINGS, ANSWER = "recording.h5", "model.toml", "settings.json", "answer.json"
 """Files in a case's folder under `open`; the last is written by the diagnosis."""
+FURTHER = "recording_{}.h5"
+"""File of a further recording of a case, by its number."""
 DIED = "died"
 """Key in an answer that was written because the worker process died."""
 CLEAN = "clean"

@@ -2,27 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.document import diagnosis_from_json
 from analysis.evaluation.blind_test.controlled import ControlOutcome
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
 from analysis.evaluation.blind_test.score import Score, score
 from study.errors import resumable
-from study.evaluation.bank.ask_engine import is_answered
+from study.evaluation.bank.ask_engine import ask_and_count, is_answered
 from study.evaluation.bank.follow_up import NEXT, follow_up
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.bank.seal_cases import BankPlan, drawable_cases, read_case_names, redraw_recording, seal_cases
-from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, reveal_bank
-
-
-def reveal_cases(folder: ProofFolder, cases: int) -> tuple[Outcome, ...]:
-    """Outcomes of the answered cases among the first `cases` numbers. Raises StudyError where a seal is broken."""
-    return reveal_bank(folder, cases, outcome_of)
+from study.evaluation.bank.sealed_bank import BankOptions, Progress, answered_fields, engines, reveal_bank
 
 
 def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
@@ -32,18 +27,11 @@ def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
         for each in label["truth"]
     )
     return Outcome(
-        number=label["number"],
-        seed=label["seed"],
-        kind=label["kind"],
         bank=label["bank"],
-        axes=tuple(label["axes"]),
         model=label["concealed"],
         concealed=concealed,
         strengths=tuple(label["strengths"]),
-        adds=label["adds"],
-        diagnosis=None if "failed" in answer else diagnosis_from_json(answer["diagnosis"]),
-        channel_errors=answer.get("channel_errors", {}),
-        seconds=answer.get("cpu_seconds", float("nan")),
+        **answered_fields(label, answer),
     )
 
 
@@ -79,13 +67,9 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
         seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = read_case_names(folder, numbers)
         _answer_cases(folder, plan, options, dict(zip(names, numbers, strict=True)), on_progress)
-        outcomes = reveal_cases(folder, plan.cases)
+        outcomes = reveal_bank(folder, plan.cases, outcome_of)
         followed = follow_up(
-            folder,
-            plan,
-            outcomes,
-            (options.answering, options.keep),
-            lambda done, of: on_progress("following up", done, of),
+            folder, plan, outcomes, (options.answering, options.keep), partial(on_progress, "following up")
         )
         controls = _controls(path, plan, options, on_progress)
     return BlindTest(
@@ -110,12 +94,12 @@ def _answer_cases(
     for name, number in numbers.items():
         if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
             redraw_recording(folder.open / name, plan, read_label(folder.label(number)))
-    answer_bank(folder, numbers, tuple(numbers), options, on_progress)
+    ask_and_count(folder, tuple(numbers), options.answering, partial(on_progress, "diagnosing"), keep=options.keep)
 
 
 def _controls(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> tuple[ControlOutcome, ...]:
     found: tuple[ControlOutcome, ...] = ()
     for seed in range(plan.seed, plan.seed + CONTROL_TURNS) if options.controls else ():
         there = path / "controls" / str(seed)
-        found += run_controls(there, seed, options.answering, lambda done, of: on_progress("controls", done, of))
+        found += run_controls(there, seed, options.answering, partial(on_progress, "controls"))
     return found

@@ -8,7 +8,7 @@ from pathlib import Path
 from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
 from analysis.evaluation.blind_test.controlled import ControlOutcome, judge_control
 from study.errors import StudyError
-from study.evaluation.bank.ask_engine import Workers, ask_engine, forget_recording, is_answered
+from study.evaluation.bank.ask_engine import Workers, ask_and_count
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.challenge.controls import CONTROLS, Control, ControlInput
@@ -36,16 +36,7 @@ def run_controls(
     folder.open.mkdir(parents=True, exist_ok=True)
     names = {control.name: _prepare_control(folder, seed, control, rig) for control in controls}
     every = [name for each in names.values() for name in each]
-    done = sum(is_answered(folder.open / name) for name in every)
-    on_done(done, len(every))
-
-    def on_answered(name: str) -> None:
-        nonlocal done
-        done += 1
-        forget_recording(folder.open / name)
-        on_done(done, len(every))
-
-    ask_engine(folder, every, workers, on_answered)
+    ask_and_count(folder, every, workers, on_done, keep=False)
     return tuple(
         judge_control(
             f"{control.name}, seed {seed}",

@@ -7,9 +7,10 @@ possible truths could be found by trying their hashes.
 
 import json
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +30,7 @@ from study.workflows.worker_processes import worker_processes
 
 def truths(case: Case) -> list[dict[str, Any]]:
     """One entry per concealed effect; empty where the model lacks nothing."""
-    return [
-        {
-            "effect": truth.effect,
-            "place": truth.place,
-            "axis": truth.axis,
-            "values": truth.values,
-            "unseen": truth.unseen,
-        }
-        for truth in case.truth
-    ]
+    return [asdict(truth) for truth in case.truth]
 
 
 SALT_BYTES = 16
@@ -66,12 +58,19 @@ def drawable_cases(plan: BankPlan) -> tuple[Draw, ...]:
 def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
     """Draw, write and seal the missing cases, calling `on_sealed(count)`. Returns the SHA-256 of labels.sha256, to
     be published before anything is diagnosed. Raises StudyError."""
-    drawn = drawable_cases(plan)
-    missing = [each for each in drawn if not folder.label(each.number).exists()]
-    done = len(drawn) - len(missing)
+    write_case = {each.number: partial(seal_one, folder, each) for each in drawable_cases(plan)}
+    return seal_missing(folder, write_case, workers, on_sealed)
+
+
+def seal_missing(
+    folder: ProofFolder, write_case: Mapping[int, Callable[[], None]], workers: int, on_sealed: Callable[[int], None]
+) -> str:
+    """Write the cases without a label in worker processes, and seal the bank. write_case: by the case's number."""
+    missing = [write for number, write in write_case.items() if not folder.label(number).exists()]
+    done = len(write_case) - len(missing)
     on_sealed(done)
     with finished_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
-        for finished in as_completed([pool.submit(seal_one, folder, each) for each in missing]):
+        for finished in as_completed([pool.submit(write) for write in missing]):
             finished.result()
             done += 1
             on_sealed(done)

@@ -1,11 +1,12 @@
-"""Steps that all sealed banks share: answer the open cases, check the seals, reveal the labels."""
+"""Steps that all sealed banks share: check the seals, reveal the labels."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from study.evaluation.bank.ask_engine import Workers, ask_engine, forget_recording, is_answered
+from analysis.diagnosis.document import diagnosis_from_json
+from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.bank.proof_folder import ANSWER, ProofFolder
 from study.evaluation.bank.proof_seals import (
     answers_sealed_case,
@@ -40,24 +41,6 @@ class BankOptions:
         return self.workers if self.executor is None else self.executor
 
 
-def answer_bank(
-    folder: ProofFolder, names: Iterable[str], asked: Sequence[str], options: BankOptions, on_progress: Progress
-) -> None:
-    """Diagnose the cases in `asked` that have no answer. names: all cases, for the progress."""
-    every = tuple(names)
-    done = sum(is_answered(folder.open / name) for name in every)
-    on_progress("diagnosing", done, len(every))
-
-    def on_answered(name: str) -> None:
-        nonlocal done
-        done += 1
-        if not options.keep:
-            forget_recording(folder.open / name)
-        on_progress("diagnosing", done, len(every))
-
-    ask_engine(folder, asked, options.answering, on_answered)
-
-
 def reveal_bank(
     folder: ProofFolder,
     cases: int,
@@ -88,6 +71,17 @@ def reveal_bank(
     if broken:
         raise broken_seal_error(broken, folder.path)
     return tuple(found)
+
+
+def answered_fields(label: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of an `AnsweredCase`, from a revealed label and the answer of the diagnosis."""
+    return {
+        **{key: label[key] for key in ("number", "seed", "kind", "adds")},
+        "axes": tuple(label["axes"]),
+        "diagnosis": None if "failed" in answer else diagnosis_from_json(answer["diagnosis"]),
+        "channel_errors": answer.get("channel_errors", {}),
+        "seconds": answer.get("cpu_seconds", float("nan")),
+    }
 
 
 def engines(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:

@@ -2,19 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from analysis.diagnosis.document import diagnosis_from_json
 from analysis.evaluation.laws.law_error import law_error
 from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
 from analysis.evaluation.laws.law_score import LawScore, law_score
 from study.errors import resumable
-from study.evaluation.bank.ask_engine import is_answered
+from study.evaluation.bank.ask_engine import ask_and_count, is_answered
 from study.evaluation.bank.laws.seal_laws import fresh_file, fresh_motions, seal_laws
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.seal_cases import BankPlan, read_case_names
-from study.evaluation.bank.sealed_bank import BankOptions, Progress, answer_bank, engines, reveal_bank
+from study.evaluation.bank.sealed_bank import BankOptions, Progress, answered_fields, engines, reveal_bank
 from study.store.disk.provenance import sha256_of
 
 LAWS = "laws"
@@ -41,7 +41,9 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
         names = read_case_names(folder, range(plan.cases))
         there = [name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()]
-        answer_bank(folder, names, there, options, on_progress)
+        ask_and_count(
+            folder, names, options.answering, partial(on_progress, "diagnosing"), keep=options.keep, asked=there
+        )
     outcomes = reveal_laws(folder, plan.cases)
     return LawBlindTest(folder, plan, seal, outcomes, law_score(outcomes), engines(folder, names))
 
@@ -60,18 +62,7 @@ def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
 
 def _outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh: Path) -> LawOutcome:
     truth = None if label["truth"] is None else _true_law(label["truth"])
-    found = LawOutcome(
-        number=label["number"],
-        seed=label["seed"],
-        kind=label["kind"],
-        concealed=label["concealed"],
-        axes=tuple(label["axes"]),
-        truth=truth,
-        adds=label["adds"],
-        diagnosis=None if "failed" in answer else diagnosis_from_json(answer["diagnosis"]),
-        channel_errors=answer.get("channel_errors", {}),
-        seconds=answer.get("cpu_seconds", float("nan")),
-    )
+    found = LawOutcome(concealed=label["concealed"], truth=truth, **answered_fields(label, answer))
     if truth is None or not found.laws:
         return found
     motions = fresh_motions(fresh, label["axes"], truth.axes, truth.acts_on == ("response",))

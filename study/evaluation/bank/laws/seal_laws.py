@@ -4,40 +4,31 @@ fresh test motion."""
 import json
 import secrets
 from collections.abc import Callable, Sequence
-from concurrent.futures import as_completed
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from analysis.evaluation.laws.law_error import FreshMotion
-from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
-from study.evaluation.bank.proof_seals import seal
-from study.evaluation.bank.seal_cases import PROCESSOR_S, SALT_BYTES, BankPlan
+from study.evaluation.bank.seal_cases import PROCESSOR_S, SALT_BYTES, BankPlan, seal_missing
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 from study.evaluation.challenge.laws.draw_law import Fresh, LawCase, LawDraw, draw_law, law_case
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import write_text
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
-from study.workflows.worker_processes import worker_processes
 
 
 def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
     """Draw, write and seal the missing cases, calling `on_sealed(count)`. Returns the SHA-256 of labels.sha256.
     Raises StudyError."""
     drawn = [draw_law(plan.seed, number, plan.brief) for number in range(plan.cases)]
-    left = [each for each in drawn if not folder.label(each.number).exists()]
-    done = len(drawn) - len(left)
-    on_sealed(done)
-    with finished_cases(folder), worker_processes(workers if len(left) > 1 else 1) as pool:
-        for finished in as_completed([pool.submit(_seal_law, folder, each) for each in left]):
-            finished.result()
-            done += 1
-            on_sealed(done)
-    return seal(folder)
+    write_case = {each.number: partial(_seal_law, folder, each) for each in drawn}
+    return seal_missing(folder, write_case, workers, on_sealed)
 
 
 def fresh_file(folder: ProofFolder, number: int) -> Path:

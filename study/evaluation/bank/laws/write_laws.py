@@ -121,7 +121,7 @@ def _row(of: LawOutcome) -> LawRow:
     error, louder = of.errors or (None, None)
     return LawRow(
         of.number, of.seed, of.kind, of.concealed, " ".join(of.axes if of.truth is None else of.truth.axes),
-        " ".join(f"{name}={value:.4g}" for name, value in numbers.items()), of.shows, of.verdict,
+        " ".join(f"{name}={value:.4g}" for name, value in numbers.items()), of.detectable, of.verdict,
         " and ".join(map(_law_text, of.named)), " ".join(of.names), " and ".join(map(_law_text, of.candidates)),
         of.structured, _short(error), _short(louder), _short(of.left("retuned")), _short(of.left("after")),
         _short(of.seconds), of.missed,

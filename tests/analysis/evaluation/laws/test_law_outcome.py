@@ -38,8 +38,9 @@ def said(expression, verdict="explained", acts_on="force", key="effects"):
 
 def outcome(expression, errors=(0.01, 0.2), **how):
     return LawOutcome(
-        1, 2, "law", TRUTH.law, ("y",), TRUTH, 10.0, said(expression, **how), {"retuned": {"ay": 9.0}}, 3.0, errors
-    )
+        number=1, seed=2, kind="law", concealed=TRUTH.law, axes=("y",), truth=TRUTH, adds=10.0,
+        diagnosis=said(expression, **how), channel_errors={"retuned": {"ay": 9.0}}, seconds=3.0, errors=errors,
+    )  # fmt: skip
 
 
 def test_the_same_law_is_right_and_near():

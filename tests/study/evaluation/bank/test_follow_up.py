@@ -11,8 +11,17 @@ from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
 from analysis.evaluation.blind_test.follow_up import FollowUp, follow_up_figures
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from study.errors import StudyError
-from study.evaluation.bank.follow_up import DRAWN, FURTHER, NEXT, PROPOSED, follow_up
-from study.evaluation.bank.proof_folder import ANSWER, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
+from study.evaluation.bank.follow_up import DRAWN, NEXT, PROPOSED, follow_up
+from study.evaluation.bank.proof_folder import (
+    ANSWER,
+    DIED,
+    FURTHER,
+    MODEL,
+    RECORDING,
+    SETTINGS,
+    ProofFolder,
+    open_proof_folder,
+)
 from study.evaluation.bank.prove import outcome_of
 from study.evaluation.bank.seal_cases import BankPlan, seal_one, settings_text
 from study.evaluation.challenge.draw_bank import draw
@@ -99,11 +108,26 @@ def test_the_same_call_continues_without_doing_anything_twice(followed):
 def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_played(tmp_path, monkeypatch):
     folder, outcome, _ = started(tmp_path / "bank", False)
     asked = []
-    monkeypatch.setattr("study.evaluation.bank.follow_up.ask_engine", lambda again, names, *_: asked.extend(names))
+    monkeypatch.setattr("study.evaluation.bank.ask_engine.ask_engine", lambda again, names, *_: asked.extend(names))
     with pytest.raises(StudyError, match="answer.json"):  # without an answer
         follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
     (name,) = asked
     assert (folder.path / NEXT / "open" / name / FURTHER.format(2)).exists()
+
+
+def test_a_case_whose_process_died_keeps_all_its_recordings(tmp_path, monkeypatch):
+    """It is asked again by the next run, with what was sealed."""
+
+    def die(again, names, _, on_answered):
+        for name in names:
+            (again.open / name / ANSWER).write_text(json.dumps({"name": name, "failed": "it died", DIED: True}))
+            on_answered(name)
+
+    folder, outcome, _ = started(tmp_path / "bank", False)
+    monkeypatch.setattr("study.evaluation.bank.ask_engine.ask_engine", die)
+    follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
+    (place,) = (folder.path / NEXT / "open").iterdir()
+    assert {path.name for path in place.glob("*.h5")} == {RECORDING, FURTHER.format(2)}
 
 
 def test_a_start_with_one_name_is_not_taken_up_again(tmp_path):

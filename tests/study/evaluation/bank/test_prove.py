@@ -13,9 +13,9 @@ from study.errors import StudyError, UserInterruptError
 from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.bank.proof_summary import blind_test_lines, summary
-from study.evaluation.bank.prove import prove, reveal_cases
+from study.evaluation.bank.prove import outcome_of, prove
 from study.evaluation.bank.seal_cases import BankPlan, drawable_cases
-from study.evaluation.bank.sealed_bank import BankOptions
+from study.evaluation.bank.sealed_bank import BankOptions, reveal_bank
 from study.evaluation.bank.write_proof import commit, write_proof, write_table
 from study.evaluation.challenge.draw_bank import draw
 from study.store.disk.file_errors import UnusableFileError
@@ -135,7 +135,7 @@ def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):
     path = next(folder.sealed.glob("*.json"))
     path.write_text(path.read_text().replace('"kind"', '"kind" '))
     with pytest.raises(StudyError, match="A seal is broken"):
-        reveal_cases(folder, 100)
+        reveal_bank(folder, 100, outcome_of)
     sealed = folder.seals.read_text()
     with pytest.raises(StudyError, match="A seal is broken"):
         prove(folder.path, PLAN, BankOptions(), lambda *_: None)
@@ -154,7 +154,7 @@ def test_an_answer_that_does_not_say_what_it_is_to_breaks_the_seal(copied, witho
     said = json.loads(path.read_text())
     path.write_text(json.dumps({key: value for key, value in said.items() if key != without}))
     with pytest.raises(StudyError, match="A seal is broken"):
-        reveal_cases(copied, 100)
+        reveal_bank(copied, 100, outcome_of)
 
 
 @pytest.mark.parametrize("torn", [ANSWER, "label"])
@@ -170,7 +170,7 @@ def test_an_error_that_is_not_known_is_read(copied):
     said = json.loads(path.read_text())
     path.write_text(json.dumps(said | {"channel_errors": {"retuned": {"ax": float("nan")}}}))
     assert "NaN" in path.read_text()
-    assert len(reveal_cases(copied, 100)) == len(drawable_cases(PLAN))
+    assert len(reveal_bank(copied, 100, outcome_of)) == len(drawable_cases(PLAN))
 
 
 @pytest.mark.slow
