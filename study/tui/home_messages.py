@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from textual.message import Message
 
+from study.tui.engine.to_engine import Diagnose, ToEngine
+
 
 @dataclass(eq=False)
 class BeginWanted(Message):
@@ -29,27 +31,6 @@ class ResumeWanted(Message):
 
 
 @dataclass(eq=False)
-class SessionWanted(Message):
-    """Look at it."""
-
-    path: str
-
-
-@dataclass(eq=False)
-class AnalyzeWanted(Message):
-    """Write its tables, figures and report anew."""
-
-    path: str
-
-
-@dataclass(eq=False)
-class WithdrawWanted(Message):
-    """Erase the data of this session's participant. The code was typed to confirm it."""
-
-    path: str
-
-
-@dataclass(eq=False)
 class WatchWanted(Message):
     """Follow it while it runs."""
 
@@ -57,52 +38,17 @@ class WatchWanted(Message):
 
 
 @dataclass(eq=False)
-class DiagnosisWanted(Message):
-    """Show this diagnosis."""
-
-    path: str
-    """Path of a diagnosis.json."""
-
-
-@dataclass(eq=False)
 class DiagnoseWanted(Message):
-    """Compare recordings with a model."""
+    """Compare recordings with a model, and show how far that is."""
 
-    sources: tuple[str, ...]
-    """Files, or one session's folder."""
-    model: str
-    """Empty: none is given."""
-    out: str
-    """Folder for the results; empty: a new one near what is diagnosed."""
-    clean: tuple[str, ...] = ()
-    """Recordings of the device when it was in order."""
+    command: Diagnose
 
 
 @dataclass(eq=False)
-class CalibrateWanted(Message):
-    """Lay the accelerometer on this serial line down in six positions."""
+class CommandWanted(Message):
+    """A request that the engine takes as it is."""
 
-    port: str
-    baud: int
-
-
-@dataclass(eq=False)
-class LaidDown(Message):
-    """The device lies as the engine asked."""
-
-    number: int
-
-
-@dataclass(eq=False)
-class KeepWanted(Message):
-    """Put the table of a calibration into the lab's file."""
-
-    table: str
-
-
-@dataclass(eq=False)
-class CalibrationStopped(Message):
-    """End it; nothing is written."""
+    command: ToEngine
 
 
 @dataclass(eq=False)

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from textual import on
 from textual.app import App, SystemCommand
 from textual.binding import Binding, BindingType
 from textual.events import Event
@@ -20,7 +19,7 @@ from study.session.watching.requests import NoteAsked, PauseAsked
 from study.tui import home_messages
 from study.tui.app import outcomes
 from study.tui.app.app_start import AppStart
-from study.tui.app.archive_screens import ArchiveScreens, ArchiveWanted, command_for
+from study.tui.app.archive_screens import ArchiveScreens
 from study.tui.app.engine_line import EngineLine, EngineMessage
 from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
@@ -242,19 +241,11 @@ class HapteqApp(App[None]):
     async def on_home_wanted(self) -> None:
         await self._archive.home()
 
-    @on(home_messages.SessionWanted)
-    @on(home_messages.DiagnosisWanted)
-    @on(home_messages.AnalyzeWanted)
-    @on(home_messages.WithdrawWanted)
-    @on(home_messages.CalibrateWanted)
-    @on(home_messages.LaidDown)
-    @on(home_messages.KeepWanted)
-    @on(home_messages.CalibrationStopped)
-    def _archive_wanted(self, wanted: ArchiveWanted) -> None:
-        self._engine.send(command_for(wanted))
+    def on_command_wanted(self, wanted: home_messages.CommandWanted) -> None:
+        self._engine.send(wanted.command)
 
     async def on_diagnose_wanted(self, wanted: home_messages.DiagnoseWanted) -> None:
-        await self._archive.diagnose(wanted)
+        await self._archive.diagnose(wanted.command)
 
     def on_watch_wanted(self, wanted: home_messages.WatchWanted) -> None:
         self._watching.confirm(wanted.path, lambda request: self._engine.send(AskOtherSession(wanted.path, request)))

@@ -22,62 +22,13 @@ from study.tui.engine.from_engine import (
     Withdrawn,
     Working,
 )
-from study.tui.engine.to_engine import (
-    Analyze,
-    CalibrateSensor,
-    Diagnose,
-    KeepSensor,
-    LetGo,
-    Reply,
-    ShowDiagnosis,
-    ShowHome,
-    ShowSession,
-    ToEngine,
-    Withdraw,
-)
-from study.tui.home_messages import (
-    AnalyzeWanted,
-    CalibrateWanted,
-    CalibrationStopped,
-    DiagnoseWanted,
-    DiagnosisWanted,
-    KeepWanted,
-    LaidDown,
-    SessionWanted,
-    WithdrawWanted,
-)
+from study.tui.engine.to_engine import Diagnose, LetGo, ShowHome, ToEngine
 
 if TYPE_CHECKING:
     from study.tui.screens.diagnosing import DiagnosingScreen
     from study.tui.screens.home import HomeScreen
     from study.tui.screens.sensor import SensorScreen
     from study.tui.screens.session import SessionScreen
-
-
-SensorWanted = CalibrateWanted | LaidDown | KeepWanted | CalibrationStopped
-ArchiveWanted = SessionWanted | DiagnosisWanted | AnalyzeWanted | WithdrawWanted | SensorWanted
-"""Requests of these screens, besides sittings."""
-
-
-def command_for(wanted: ArchiveWanted) -> ToEngine:
-    """The engine's command for a request of a screen."""
-    match wanted:
-        case SessionWanted(path=path):
-            return ShowSession(path)
-        case DiagnosisWanted(path=path):
-            return ShowDiagnosis(path)
-        case AnalyzeWanted(path=path):
-            return Analyze(path)
-        case WithdrawWanted(path=path):
-            return Withdraw(path)
-        case CalibrateWanted(port=port, baud=baud):
-            return CalibrateSensor(port, baud)
-        case LaidDown(number=number):
-            return Reply(number, True)
-        case KeepWanted(table=table):
-            return KeepSensor(table)
-        case CalibrationStopped():
-            return LetGo()
 
 
 class ArchiveScreens:
@@ -129,7 +80,7 @@ class ArchiveScreens:
             case Trouble(sentence=sentence) | Preparing(sentence=sentence):
                 self._app.notify(sentence, markup=False)
 
-    async def diagnose(self, wanted: DiagnoseWanted) -> None:
+    async def diagnose(self, command: Diagnose) -> None:
         """Start a diagnosis; its screen is removed when it ends."""
         from study.tui.screens.diagnosing import DiagnosingScreen
 
@@ -138,7 +89,7 @@ class ArchiveScreens:
             if stopped_here:
                 self._send(LetGo())
 
-        self._send(Diagnose(wanted.sources, wanted.model, wanted.out, wanted.clean))
+        self._send(command)
         self._diagnosing = DiagnosingScreen("Getting ready.")
         await self._app.push_screen(self._diagnosing, stopped)
 

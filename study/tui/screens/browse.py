@@ -12,7 +12,8 @@ from textual.screen import ModalScreen
 from textual.widgets import DirectoryTree, Footer, Input, Static
 
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.home_messages import DiagnosisWanted, SessionWanted
+from study.tui.engine.to_engine import ShowDiagnosis, ShowSession
+from study.tui.home_messages import CommandWanted
 from study.tui.screens.help import HelpScreen
 
 LOG, DIAGNOSIS = "events.jsonl", "diagnosis.json"
@@ -99,8 +100,8 @@ class BrowseScreen(ModalScreen[None]):
         dismiss_screen(self, None)
 
     def _open_path(self, path: Path) -> None:
-        wanted = SessionWanted(str(path.parent)) if path.name == LOG else DiagnosisWanted(str(path))
-        self.app.post_message(wanted)
+        command = ShowSession(str(path.parent)) if path.name == LOG else ShowDiagnosis(str(path))
+        self.app.post_message(CommandWanted(command))
         dismiss_screen(self, None)
 
     def _show_message(self, text: str) -> None:

@@ -12,6 +12,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Footer, Input, Label, Static
 
 from study.tui.dismiss_screen import dismiss_screen
+from study.tui.engine.to_engine import Diagnose
 from study.tui.home_messages import DiagnoseWanted
 from study.tui.screens.help import HelpScreen
 
@@ -102,7 +103,7 @@ class DiagnoseForm(ModalScreen[None]):
         elif model and not Path(model).is_file():
             self._show_message(f"There is no file {model}.", "model")
         elif self.is_active:
-            self.app.post_message(DiagnoseWanted(sources, model, out, named["clean"]))
+            self.app.post_message(DiagnoseWanted(Diagnose(sources, model, out, named["clean"])))
             dismiss_screen(self, None)
 
     def action_help(self) -> None:

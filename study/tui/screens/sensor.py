@@ -11,7 +11,8 @@ from textual.widgets import Footer, Input, Label, Static
 
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.engine.from_engine import Calibrated, LayDown, SensorKept
-from study.tui.home_messages import CalibrateWanted, CalibrationStopped, KeepWanted, LaidDown
+from study.tui.engine.to_engine import CalibrateSensor, KeepSensor, LetGo, Reply
+from study.tui.home_messages import CommandWanted
 
 HELP = """\
 # The accelerometer in six positions
@@ -117,15 +118,15 @@ class SensorScreen(Screen[None]):
             self.query_one("#seen", Static).update("")
             self._lock(True)
             self._show_line("The port is opened…")
-            self.post_message(CalibrateWanted(port, int(baud)))
+            self.post_message(CommandWanted(CalibrateSensor(port, int(baud))))
 
     def action_go_on(self) -> None:
         if self._waits_for is not None:
             self._note(f"{self._waits_for.position}: listening, leave it at rest…")
-            self.post_message(LaidDown(self._waits_for.number))
+            self.post_message(CommandWanted(Reply(self._waits_for.number, True)))
             self._waits_for = None
         elif self._table:
-            self.post_message(KeepWanted(self._table))
+            self.post_message(CommandWanted(KeepSensor(self._table)))
             self._table = ""
             self._show_line("It is written…")
         elif isinstance(self.focused, Input):
@@ -133,7 +134,7 @@ class SensorScreen(Screen[None]):
 
     def action_leave(self) -> None:
         if self._under_way:
-            self.post_message(CalibrationStopped())
+            self.post_message(CommandWanted(LetGo()))
         dismiss_screen(self, None)
 
     @on(Input.Changed)

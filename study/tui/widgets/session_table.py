@@ -13,7 +13,8 @@ from textual.widgets import DataTable
 from study.local_clock import machine_zone
 from study.session.views.archive_views import SessionLine
 from study.session.views.local_time import local_column
-from study.tui.home_messages import ResumeWanted, SessionWanted, WatchWanted
+from study.tui.engine.to_engine import ShowSession
+from study.tui.home_messages import CommandWanted, ResumeWanted, WatchWanted
 from study.tui.session_status import STYLES, status_text
 
 _NAME, _STANDING, _BEGUN, _RUNS, _ANSWERS, _PROTOCOL = (
@@ -117,7 +118,7 @@ class SessionTable(DataTable[Content | str]):
 
     def on_data_table_row_selected(self) -> None:
         if self._chosen is not None:
-            self.post_message(SessionWanted(self._chosen.path))
+            self.post_message(CommandWanted(ShowSession(self._chosen.path)))
 
     def action_resume(self) -> None:
         if self._chosen is not None:

@@ -10,6 +10,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
 from study.tui.app.app import HapteqApp
 from study.tui.app.app_start import AppStart
+from study.tui.engine.to_engine import Diagnose
 from study.tui.home_messages import DiagnoseWanted
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
@@ -57,7 +58,9 @@ def run(data, story):
 def test_esc_stops_it_and_nothing_is_written(files):
     async def story(sitter):
         await sitter.until("HomeScreen")
-        sitter.app.post_message(DiagnoseWanted((str(files / "rec.h5"),), str(files / "one.toml"), str(files / "out")))
+        sitter.app.post_message(
+            DiagnoseWanted(Diagnose((str(files / "rec.h5"),), str(files / "one.toml"), str(files / "out")))
+        )
         await sitter.until("DiagnosingScreen", "e-tuning")
         await sitter.pilot.press("escape")
         await sitter.until("OutcomeScreen", "The diagnosis was stopped")
@@ -73,7 +76,7 @@ def test_esc_stops_it_and_nothing_is_written(files):
 def test_what_cannot_be_diagnosed_is_reported_on_a_panel(files):
     async def story(sitter):
         await sitter.until("HomeScreen")
-        sitter.app.post_message(DiagnoseWanted((str(files / "rec.h5"),), str(files / "three.toml"), ""))
+        sitter.app.post_message(DiagnoseWanted(Diagnose((str(files / "rec.h5"),), str(files / "three.toml"), "")))
         await sitter.until("OutcomeScreen", "Model and recording do not belong together")
         assert "DiagnosingScreen" not in [type(screen).__name__ for screen in sitter.app.screen_stack]
 

@@ -59,8 +59,9 @@ class Bare(App[None]):
 
 
 def messages_of(app: Bare) -> list[tuple[object, ...]]:
-    """What the screen asked for: the name and the fields of each message."""
-    return [(type(each).__name__, *(getattr(each, name) for name in each.__dataclass_fields__)) for each in app.asked]
+    """What the screen asked for: the name and the fields of each message, or of the engine's command in it."""
+    asked = [getattr(each, "command", each) for each in app.asked]
+    return [(type(each).__name__, *(getattr(each, name) for name in each.__dataclass_fields__)) for each in asked]
 
 
 class Sight:

@@ -28,7 +28,7 @@ def filled(on_screen, folder, sources, model="", out="", *keys, clean=""):
         seen.append(sight.words)
 
     app = on_screen(DiagnoseForm(), story, (100, 30))
-    return app.asked, seen[0]
+    return [each.command for each in app.asked], seen[0]
 
 
 @pytest.mark.parametrize("key", ["f5", "enter"])

@@ -11,6 +11,7 @@ from study.tui.screens.browse import BrowseScreen
 from study.tui.screens.diagnosis import DiagnosisScreen
 from study.tui.screens.home import HomeScreen
 from study.tui.screens.preparing import PreparingScreen, elapsed_words
+from tests.study.tui.home.conftest import messages_of
 
 
 @pytest.mark.parametrize("size", [(80, 24), (132, 40)], ids=["80x24", "132x40"])
@@ -80,7 +81,7 @@ def browse(on_screen, folder, *keys, typed=None):
         seen.append(sight.text)
 
     app = on_screen(BrowseScreen(str(folder)), story, (100, 30))
-    return [(type(m).__name__, m.path) for m in app.asked], seen
+    return messages_of(app), seen
 
 
 def test_only_folders_and_our_files_are_offered(on_screen, folder):
@@ -93,13 +94,13 @@ def test_only_folders_and_our_files_are_offered(on_screen, folder):
 
 def test_a_diagnosis_is_picked_with_the_keyboard(on_screen, folder):
     asked, _ = browse(on_screen, folder, "end", "enter")
-    assert asked == [("DiagnosisWanted", str(folder / "diagnosis.json"))]
+    assert asked == [("ShowDiagnosis", str(folder / "diagnosis.json"))]
 
 
 @pytest.mark.parametrize("what", ["P01_001", "P01_001/events.jsonl"])
 def test_a_session_is_opened_by_its_folder_or_its_log(on_screen, folder, what):
     asked, _ = browse(on_screen, folder, "enter", typed=folder / what)
-    assert asked == [("SessionWanted", str(folder / "P01_001"))]
+    assert asked == [("ShowSession", str(folder / "P01_001"))]
 
 
 def test_a_path_that_is_not_there_is_reported(on_screen, folder):

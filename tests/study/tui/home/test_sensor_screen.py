@@ -49,10 +49,10 @@ def test_a_person_is_led_through_six_positions(on_screen):
     assert "It is written…" in seen[7] and "Written into /lab/device.toml" in seen[8]
     # A second Enter while it listens, or while it is written, does nothing.
     assert messages_of(app) == [
-        ("CalibrateWanted", "COM3", 2_000_000),
-        ("LaidDown", 1),
-        ("LaidDown", 2),
-        ("KeepWanted", '[accelerometer]\nport = "COM3"'),
+        ("CalibrateSensor", "COM3", 2_000_000),
+        ("Reply", 1, True),
+        ("Reply", 2, True),
+        ("KeepSensor", '[accelerometer]\nport = "COM3"'),
     ]
 
 
@@ -70,7 +70,7 @@ def test_esc_stops_it_and_goes_back(on_screen, home):
     story, seen = story_of(("f7",), (*PORT, "enter"), LayDown(1, "+x up", None), ("escape",))
     app = on_screen(HomeScreen(home), story, (132, 40))
     assert "1 of 6" in seen[2] and "Sessions" in seen[3]
-    assert [name for name, *_ in messages_of(app)] == ["CalibrateWanted", "CalibrationStopped"]
+    assert [name for name, *_ in messages_of(app)] == ["CalibrateSensor", "LetGo"]
 
 
 def test_after_an_error_it_begins_again(on_screen):

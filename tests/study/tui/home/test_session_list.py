@@ -14,11 +14,11 @@ from tests.study.tui.home.conftest import messages_of
 @pytest.mark.parametrize(
     ("row", "key", "expected"),
     [
-        (0, "enter", ("SessionWanted", "/data/P05_001")),
+        (0, "enter", ("ShowSession", "/data/P05_001")),
         (0, "w", ("WatchWanted", "/data/P05_001")),
-        (1, "enter", ("SessionWanted", "/data/P04_001")),
+        (1, "enter", ("ShowSession", "/data/P04_001")),
         (2, "r", ("ResumeWanted", "/data/P03_001")),
-        (4, "enter", ("SessionWanted", "/data/P01_001")),
+        (4, "enter", ("ShowSession", "/data/P01_001")),
     ],
 )
 def test_keys_do_what_the_session_under_the_cursor_allows(on_screen, home, row, key, expected):
@@ -89,7 +89,7 @@ def test_five_hundred_sessions_open_at_once_and_scroll_to_the_last(on_screen, ho
         await sight.press("f3", "ctrl+end", "enter")
         assert "P499_001" in sight.text
 
-    assert messages_of(on_screen(HomeScreen(None), story))[-1] == ("SessionWanted", "/data/P499_001")
+    assert messages_of(on_screen(HomeScreen(None), story))[-1] == ("ShowSession", "/data/P499_001")
 
 
 def test_a_newer_list_replaces_a_long_one_that_still_comes_in(on_screen, home, line):

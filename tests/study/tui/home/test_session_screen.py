@@ -7,6 +7,7 @@ from textual.widgets import TabbedContent
 
 from study.tui.screens.session import SessionScreen, file_url
 from study.tui.widgets.long_text import LongText
+from tests.study.tui.home.conftest import messages_of
 
 
 @pytest.fixture
@@ -15,8 +16,7 @@ def asked_by(on_screen):
         async def story(sight):
             await sight.press(*keys)
 
-        app = on_screen(SessionScreen(view), story)
-        return [(type(m).__name__, getattr(m, "path", None)) for m in app.asked]
+        return messages_of(on_screen(SessionScreen(view), story))
 
     return run
 
@@ -36,8 +36,8 @@ def test_each_page_looks_like_this(on_screen, session, looks_like, size):
 
 
 def test_keys_ask_for_what_a_finished_session_allows(asked_by, session):
-    assert asked_by(session, "r", "w", "a") == [("AnalyzeWanted", "/data/P01_001")]
-    assert asked_by(session, "escape") == [("HomeWanted", None)]
+    assert asked_by(session, "r", "w", "a") == [("Analyze", "/data/P01_001")]
+    assert asked_by(session, "escape") == [("HomeWanted",)]
 
 
 def test_an_unfinished_session_can_be_resumed(asked_by, session):
@@ -56,7 +56,7 @@ def test_nothing_is_analyzed_where_nothing_can_be_read(asked_by, session, gone):
 
 
 def test_withdrawal_takes_the_typed_code(asked_by, session):
-    assert asked_by(session, "x", "P", "0", "1", "enter") == [("WithdrawWanted", "/data/P01_001")]
+    assert asked_by(session, "x", "P", "0", "1", "enter") == [("Withdraw", "/data/P01_001")]
 
 
 @pytest.mark.parametrize("keys", [("P", "0", "2", "enter"), ("enter",), ("P", "0", "1", "escape")])
