@@ -29,8 +29,6 @@ def read_diagnosis(path: Path) -> Diagnosis:
         raise UnusableFileError(path, "diagnosis", error.problems) from error
 
 
-def write_diagnosis(
-    path: Path, diagnosis: Diagnosis, provenance: Provenance | None = None, *, overwrite: bool = False
-) -> None:
+def write_diagnosis(path: Path, diagnosis: Diagnosis, provenance: Provenance | None = None) -> None:
     """Write the document. Raises AlreadyThereError, CannotWriteError."""
-    write_json(path, FORMAT, VERSION, diagnosis_to_json(diagnosis), provenance, overwrite=overwrite)
+    write_json(path, FORMAT, VERSION, diagnosis_to_json(diagnosis), provenance)

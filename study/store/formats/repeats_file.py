@@ -72,8 +72,6 @@ def read_repeats(path: Path) -> Repeats:
     return found
 
 
-def write_repeats(
-    path: Path, repeats: Repeats, provenance: Provenance | None = None, *, overwrite: bool = False
-) -> None:
+def write_repeats(path: Path, repeats: Repeats, provenance: Provenance | None = None) -> None:
     """Write the document. Raises AlreadyThereError, CannotWriteError."""
-    write_json(path, FORMAT, VERSION, asdict(repeats), provenance, overwrite=overwrite)
+    write_json(path, FORMAT, VERSION, asdict(repeats), provenance)

@@ -18,12 +18,9 @@ KIND = "table of thresholds"
 """What messages call such a file."""
 
 
-def write_thresholds(path: Path, thresholds: Iterable[Threshold], *, overwrite: bool = True) -> None:
-    """Write the table; replaces an older one by default, since it can be recomputed.
-
-    Raises AlreadyThereError, CannotWriteError.
-    """
-    write_text(path, rows_to_csv(thresholds, Threshold), overwrite=overwrite)
+def write_thresholds(path: Path, thresholds: Iterable[Threshold]) -> None:
+    """Write the table; replaces an older one, since it can be recomputed. Raises CannotWriteError."""
+    write_text(path, rows_to_csv(thresholds, Threshold), overwrite=True)
 
 
 def read_thresholds(path: Path) -> tuple[Threshold, ...]:

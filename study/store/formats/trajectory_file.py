@@ -15,6 +15,6 @@ def read_trajectory(path: Path) -> Trajectory:
         raise UnusableFileError(path, "table of accelerations or forces", error.problems) from error
 
 
-def write_trajectory(path: Path, trajectory: Trajectory, *, overwrite: bool = False) -> None:
+def write_trajectory(path: Path, trajectory: Trajectory) -> None:
     """Write either kind. Raises AlreadyThereError, CannotWriteError; TableError for missing samples."""
-    write_text(path, trajectory_csv(trajectory), overwrite=overwrite)
+    write_text(path, trajectory_csv(trajectory), overwrite=False)

@@ -1,5 +1,6 @@
 """Summary of `hapteq twin`: parameters of the model, and its prediction error."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -23,21 +24,11 @@ def twin_summary(written: WrittenTwin) -> dict[str, Any]:
             "of_friction_n_s_per_m": written.piece.of_friction.tolist(),
         },
         "modes_hz": _modes_hz(written),
-        "tolerance": None
-        if tolerance is None
-        else {
-            "mass_kg": tolerance.mass_kg,
-            "damping_n_s_per_m": tolerance.damping_n_s_per_m,
-            "stiffness_n_per_m": tolerance.stiffness_n_per_m,
-            "modes": tolerance.modes,
-        },
+        "tolerance": None if tolerance is None else asdict(tolerance),
         "band_hz": list(fit.band_hz),
         "held_out": fit.held_out,
         "noise": fit.noise,
-        "channels": [
-            {"channel": error.channel, "fit": error.fit, "held_out": error.held_out, "noise": error.noise}
-            for error in fit.errors
-        ],
+        "channels": [asdict(error) for error in fit.errors],
         "notes": list(written.notes),
     }
 
