@@ -48,18 +48,6 @@ def crc_of(rows: Bytes) -> npt.NDArray[np.uint16]:
     return crc
 
 
-def encode_packets(sequence: npt.ArrayLike, time_us: npt.ArrayLike, raw: npt.ArrayLike) -> bytes:
-    """Packets as the firmware sends them; sequence (n,), time_us (n,) and raw (n, 3), taken modulo their range."""
-    numbers = np.atleast_1d(np.asarray(sequence, dtype=np.int64))
-    packets = np.zeros(len(numbers), dtype=LAYOUT)
-    packets["sync"] = int.from_bytes(SYNC, "little")
-    packets["sequence"] = numbers & 0xFFFF
-    packets["time_us"] = np.asarray(time_us, dtype=np.int64) & 0xFFFFFFFF
-    packets["raw"] = raw
-    packets["crc"] = crc_of(packets.view(np.uint8).reshape(-1, SIZE)[:, CHECKED])
-    return packets.tobytes()
-
-
 def _table() -> npt.NDArray[np.uint16]:
     table = np.arange(256, dtype=np.uint32) << 8
     for _ in range(8):

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from study.devices.accelerometer.parser import CHECKED, SIZE, SYNC, PacketParser, crc_of, encode_packets
+from study.devices.accelerometer.parser import CHECKED, SIZE, SYNC, PacketParser, crc_of
+from tests.study.devices.accelerometer.pty_board import encode_packets
 
 FIRMWARE = Path(__file__).parents[4] / "docs" / "firmware"
 
