@@ -30,6 +30,23 @@ def signals_of(recording: Recording) -> dict[str, Signal]:
     return {name: signal for name, signal in every.items() if signal is not None}
 
 
+def channels_text(signal: Signal) -> str:
+    """The channels with their units: "fx (N), fy (N)"."""
+    return ", ".join(f"{name} ({unit})" for name, unit in zip(signal.channels, signal.units, strict=True))
+
+
+def unusable_channels(signals: Sequence[Signal]) -> Iterator[tuple[str, bool]]:
+    """Channels that hold no number in any of the signals, or that never change: name, and whether it holds none.
+    signals: of the same channels."""
+    for channel, name in enumerate(signals[0].channels if signals else ()):
+        columns = [signal.samples[:, channel] for signal in signals]
+        finite = [column[np.isfinite(column)] for column in columns]
+        if not any(len(column) for column in finite):
+            yield name, True
+        elif all(not len(column) or np.ptp(column) == 0 for column in finite):
+            yield name, False
+
+
 def segment_problems(segments: Sequence[Segment], samples: int) -> Iterator[str]:
     """Sentences on segments outside the recording, with unknown kinds or impossible numbers, and on overlaps. samples:
     length of the recording."""

@@ -25,6 +25,7 @@ from equalizer.plant.linear_simulation import free_motion_rates, growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.recording import Recording
+from equalizer.signals.recording_checks import channels_text, unusable_channels
 from equalizer.signals.signal import Signal
 
 
@@ -42,8 +43,8 @@ def require_alike(
     for other, name in zip(recordings[1:], names[1:], strict=True):
         for what, expected, two in (
             ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{other.sample_rate_hz:g} Hz"),
-            ("command", _quantities_text(first.command), _quantities_text(other.command)),
-            ("response", _quantities_text(first.response), _quantities_text(other.response)),
+            ("command", channels_text(first.command), channels_text(other.command)),
+            ("response", channels_text(first.response), channels_text(other.response)),
         ):
             if expected != two:
                 problems.append(f"{name} has the {what} {two}, {names[0]} has {expected}; {what_now}")
@@ -174,13 +175,11 @@ def _constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
             "over time, is diagnosed without a model"
         )
     for side in ("response", "position"):
-        signals: list[Signal] = [found for recording in recordings if (found := getattr(recording, side)) is not None]
-        for channel, name in enumerate(signals[0].channels if signals else ()):
-            columns = [signal.samples[:, channel] for signal in signals]
-            finite = [column[np.isfinite(column)] for column in columns]
-            if not any(len(column) for column in finite):
+        signals = [found for recording in recordings if (found := getattr(recording, side)) is not None]
+        for name, empty in unusable_channels(signals):
+            if empty:
                 yield f"{side} {name} holds no number, only missing values"
-            elif side == "response" and all(not len(column) or np.ptp(column) == 0 for column in finite):
+            elif side == "response":
                 yield f"{side} {name} never changes: it was not connected, or nothing moved"
 
 
@@ -214,7 +213,7 @@ def _unlike_quantities(model: MechanicalModel, recording: Recording) -> Iterator
     if turning is not None and turning != model.rotational:
         kinds = ("translational (kg, N, m)", "rotational (kg m^2, N m, rad)")
         own, its = kinds[model.rotational], kinds[turning]
-        yield f"the model is {own}, but the recording is {its}: {_quantities_text(recording.response)}"
+        yield f"the model is {own}, but the recording is {its}: {channels_text(recording.response)}"
 
 
 def _is_rotational(recording: Recording) -> bool | None:
@@ -275,7 +274,3 @@ def _misplaced_effects(model: MechanicalModel, recording: Recording) -> Iterator
         place_recorded_effects(model, recording)
     except PlacingError as problem:
         yield str(problem)
-
-
-def _quantities_text(signal: Signal) -> str:
-    return ", ".join(f"{name} ({unit})" for name, unit in zip(signal.channels, signal.units, strict=True))

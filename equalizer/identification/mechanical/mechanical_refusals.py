@@ -2,15 +2,14 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray, Signal
+from equalizer.signals.recording_checks import channels_text, unusable_channels
+from equalizer.signals.signal import FloatArray
 
 LEAST_SAMPLES = 64
 """Fewest samples of a recording."""
@@ -27,8 +26,8 @@ def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
         for what, each, found in (
             ("sample rate", first.sample_rate_hz, other.sample_rate_hz),
             ("hold", first.hold.value, other.hold.value),
-            ("command", _channels_text(first.command), _channels_text(other.command)),
-            ("response", _channels_text(first.response), _channels_text(other.response)),
+            ("command", channels_text(first.command), channels_text(other.command)),
+            ("response", channels_text(first.response), channels_text(other.response)),
         ):
             if each != found:
                 raise MechanicalFitRefused(
@@ -52,19 +51,15 @@ def _refuse_samples(recordings: Sequence[Recording]) -> None:
     if (longest := max(len(recording) for recording in recordings)) < LEAST_SAMPLES:
         raise MechanicalFitRefused(f"{longest} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
     for side in ("command", "response"):
-        signals: list[Signal] = [getattr(recording, side) for recording in recordings]
-        for channel, name in enumerate(signals[0].channels):
-            columns = [signal.samples[:, channel] for signal in signals]
-            finite = [column[np.isfinite(column)] for column in columns]
-            if not any(len(column) for column in finite):
+        for name, empty in unusable_channels([getattr(recording, side) for recording in recordings]):
+            if empty:
                 raise MechanicalFitRefused(
                     f"{side} {name} holds no number, only missing values; leave it out, or import it again"
                 )
-            if all(not len(column) or np.ptp(column) == 0 for column in finite):
-                raise MechanicalFitRefused(
-                    f"{side} {name} is constant throughout, so nothing can be told from it; "
-                    "leave it out, or record it driven"
-                )
+            raise MechanicalFitRefused(
+                f"{side} {name} is constant throughout, so nothing can be told from it; "
+                "leave it out, or record it driven"
+            )
 
 
 def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
@@ -88,7 +83,3 @@ def refuse_unstable(final: RefinedFit[Structure] | RefinedFit[ModalStructure]) -
             f"the best fit is unstable (it grows e-fold in {1 / fastest:.3g} s): look for a feedback in the command "
             "that was not recorded, or a polarity that changes"
         )
-
-
-def _channels_text(signal: Signal) -> str:
-    return ", ".join(f"{name} ({unit})" for name, unit in zip(signal.channels, signal.units, strict=True))
