@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import parts_of
 from analysis.wording import typeset
 from equalizer.signals.recording import Recording
 from equalizer.signals.recording_checks import signals_of
@@ -50,11 +49,6 @@ def channels_of(recording: Recording) -> tuple[Channel, ...]:
             signal.channels, signal.quantities, signal.units, signal.samples.T, strict=True
         )
     )
-
-
-def stretches_of(recording: Recording) -> tuple[Stretch, ...]:
-    """Parts of the recording: between them the state of the device jumps."""
-    return parts_of(recording)
 
 
 def format_value(value: float, unit: str, digits: int = 3) -> str:

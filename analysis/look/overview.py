@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.data.observed_parts import parts_of
 from analysis.diagnosis.noise.rounding import rounding_step
-from analysis.look.channels import Channel, Stretch, channels_of, rms, stretches_of
+from analysis.look.channels import Channel, Stretch, channels_of, rms
 from analysis.look.check import Check
 from analysis.look.clipping import check_clipping
 from analysis.look.clock import CLOCK, check_clock
@@ -111,7 +112,7 @@ class Overview(Summarised):
 
 def overview(name: str, recording: Recording) -> Overview:
     """Channels, spectra, levels and checks of a recording. name: of the file, for tables and figures."""
-    channels, stretches, rate_hz = channels_of(recording), stretches_of(recording), recording.sample_rate_hz
+    channels, stretches, rate_hz = channels_of(recording), parts_of(recording), recording.sample_rate_hz
     spectra = cross_spectra(channels, stretches, rate_hz)
     bands = find_driven_bands(spectra, channels) if spectra else ()
     coherences = response_coherences(spectra, channels, bands) if spectra else ()

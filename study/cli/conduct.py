@@ -56,13 +56,10 @@ def begin(
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
     _confirm_free_handle(sitter.observer, device, sitter.hands_off)
-    words = words_of(plan.session.protocol)
-    _say_wait(sitter.observer, words)
     in_real_time = sitter.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock()
-    with _participant(sitter.observer, plan.session.seed, sitter.keys, clock, words) as participant:
-        end = conduct_new(plan.session, device, participant)
-    _say_whose(sitter.observer, words)
+    with _participant(sitter.observer, plan.session.seed, sitter.keys, clock, words_of(plan.session.protocol)) as who:
+        end = conduct_new(plan.session, device, who)
     show(end_sitting(end, RealClock().utc()), as_json)
 
 
@@ -92,11 +89,8 @@ def go_on(
     _confirm_free_handle(opened.observer, device, hands_off)
     in_real_time = opened.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock.not_before(state.sitting.last.utc)
-    words = words_of(state.protocol)
-    _say_wait(opened.observer, words)
-    with _participant(opened.observer, opened.seed, keys, clock, words) as participant:
-        end = conduct_resumed(folder, device, participant)
-    _say_whose(opened.observer, words)
+    with _participant(opened.observer, opened.seed, keys, clock, words_of(state.protocol)) as who:
+        end = conduct_resumed(folder, device, who)
     show(end_sitting(end, RealClock().utc()), as_json)
 
 
@@ -104,30 +98,23 @@ def go_on(
 def _participant(
     observer: str | None, seed: int, keys: AnswerKeys, clock: Clock, words: Words
 ) -> Iterator[Participant]:
-    if observer is None and sys.stdin is None:
+    """The participant of a sitting; a person is told to wait before, and whose the results are after it."""
+    if observer is not None:
+        with answer_count(f"simulated participant '{observer}'") as show_question:
+            yield make_simulated_participant(observer, seed, clock, on_question=show_question)
+        return
+    typer.echo(words["preparing_device"], err=True)
+    if sys.stdin is None:
         raise WrongUseError(
             "There is nothing to read answers from",
             "Standard input is closed.",
             "Start hapteq in a terminal, or with answers from a pipe.",
         )
-    if observer is None:
-        requests = QueuedRequests()
-        display = PlainDisplay(LineInput(), sys.stdout, clock, keys, requests.send, words)
-        yield Participant(display=display, hand=PersonsHand(), clock=clock, requests=requests)
-        return
-    with answer_count(f"simulated participant '{observer}'") as show_question:
-        yield make_simulated_participant(observer, seed, clock, on_question=show_question)
-
-
-def _say_wait(observer: str | None, words: Words) -> None:
-    if observer is None:
-        typer.echo(words["preparing_device"], err=True)
-
-
-def _say_whose(observer: str | None, words: Words) -> None:
-    """Results are not for the participant, who may still sit there."""
-    if observer is None:
-        typer.echo(f"\n{words['for_experimenter']}", err=True)
+    requests = QueuedRequests()
+    display = PlainDisplay(LineInput(), sys.stdout, clock, keys, requests.send, words)
+    yield Participant(display=display, hand=PersonsHand(), clock=clock, requests=requests)
+    # Results are not for the participant, who may still sit there.
+    typer.echo(f"\n{words['for_experimenter']}", err=True)
 
 
 def code_of_simulated(observer: str) -> str:

@@ -85,15 +85,11 @@ class Handle:
 
     def position_m(self) -> tuple[float, float, float]:
         """Position of the handle (m), x, y, z, in the device's axes."""
-        x, y, z = c_double(), c_double(), c_double()
-        self.library.call("dhdGetPosition", byref(x), byref(y), byref(z), self.number)
-        return x.value, y.value, z.value
+        return self._read_vector("dhdGetPosition")
 
     def velocity_mps(self) -> tuple[float, float, float]:
         """Velocity as estimated by the library, over its last 20 ms."""
-        x, y, z = c_double(), c_double(), c_double()
-        self.library.call("dhdGetLinearVelocity", byref(x), byref(y), byref(z), self.number)
-        return x.value, y.value, z.value
+        return self._read_vector("dhdGetLinearVelocity")
 
     def set_force(self, x_n: float, y_n: float, z_n: float) -> bool:
         """Whether the device gives less than that. From any thread."""
@@ -101,8 +97,11 @@ class Handle:
 
     def force_n(self) -> tuple[float, float, float]:
         """What the device says that it gives now."""
+        return self._read_vector("dhdGetForce")
+
+    def _read_vector(self, function: str) -> tuple[float, float, float]:
         x, y, z = c_double(), c_double(), c_double()
-        self.library.call("dhdGetForce", byref(x), byref(y), byref(z), self.number)
+        self.library.call(function, byref(x), byref(y), byref(z), self.number)
         return x.value, y.value, z.value
 
     def status(self) -> Status:
