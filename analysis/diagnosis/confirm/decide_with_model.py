@@ -23,12 +23,10 @@ from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement
 from analysis.diagnosis.settings import (
-    AT_RETUNING_BOUND,
     CANDIDATES_WITH_GAIN,
     FURTHER_LAW_OF_ALL,
     NAMED_ERROR,
     NAMED_OF_CEILING,
-    RETUNING_BOUND,
 )
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
@@ -84,7 +82,7 @@ def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
         return "its gain on held-out data is not larger than what varies between stretches"
     if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
         return f"on held-out data it takes {100 * min(whole.gain, last.gain):.0f} % of the error's power, not a third"
-    if np.any(np.abs(found.after.fitted.deviations) >= AT_RETUNING_BOUND * RETUNING_BOUND):
+    if context.tuning.is_at_bound(found.after.fitted.deviations):
         return "beside it, a parameter of the model stands at the end of its tolerance"
     rival = _best_rival(context, result)
     if rival is not None and _not_better(context, rival, found.after):

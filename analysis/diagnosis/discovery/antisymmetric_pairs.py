@@ -22,7 +22,6 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.discovered_law import axis_names
 
 _COUPLED = re.compile(rf"p0\*(v?)([{AXES}])")
@@ -105,7 +104,7 @@ def with_equal_halves(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> 
             shared, number = (factor + opposite) / 2, _coupled_parameter(tuning, prefix, axis, other)
             deviations[number] -= shared / tuning.deviation[number]
             values[claim]["p0"], values[partner]["p0"] = factor - shared, opposite - shared
-    if (deviations == fitted.deviations).all() or np.abs(deviations).max() > RETUNING_BOUND:
+    if (deviations == fitted.deviations).all() or np.abs(deviations).max() > tuning.bound:
         return fitted
     parts = zip(fitted.hypothesis.claims, values, strict=True)
     hypothesis = reduce(combine, [hypothesis_of_claim(claim, [own]) for claim, own in parts])
@@ -121,7 +120,7 @@ def is_taken_by_coupling(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]
         opposite = found.get((prefix, other, axis), (0, 0.0))[1]
         half = abs(factor - opposite) / 2 if factor * opposite < 0 else 0.0
         number = _coupled_parameter(tuning, prefix, axis, other)
-        if half / tuning.deviation[number] - abs(fitted.deviations[number]) <= RETUNING_BOUND:
+        if half / tuning.deviation[number] - abs(fitted.deviations[number]) <= tuning.bound:
             return True
     return False
 

@@ -17,7 +17,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.parsimony import inseparable
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, FittedCandidate, SearchContext, sensitivity_at
 from analysis.diagnosis.search.time_budget import OutOfTimeError
-from analysis.diagnosis.settings import AT_RETUNING_BOUND, LAW_NEAR, RETUNING_BOUND
+from analysis.diagnosis.settings import LAW_NEAR
 from analysis.diagnosis.types import TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModelError
 
@@ -66,9 +66,10 @@ def _starting_fits(context: SearchContext, base: Fitted, each: Sum) -> list[Fitt
     """The sum added to the fit, with the model's own parameters as they were or shifted as the sum's fit has them,
     whichever costs less; where re-tuning ended at a bound, for want of this law, also with the parameters as given."""
     recording = context.measure.records[0].recording
-    shifted = np.clip(base.deviations + each.model_shift, -RETUNING_BOUND, RETUNING_BOUND)
+    bound = context.tuning.bound
+    shifted = np.clip(base.deviations + each.model_shift, -bound, bound)
     given = np.zeros_like(base.deviations)
-    at_bound = np.abs(base.deviations).max(initial=0.0) >= AT_RETUNING_BOUND * RETUNING_BOUND
+    at_bound = context.tuning.is_at_bound(base.deviations)
     starts = (each,) if each.partner is None else pair_starts(each)
     chosen: list[Fitted] = []
     for several in ((base.deviations, shifted), *([(given,)] if at_bound else [])):

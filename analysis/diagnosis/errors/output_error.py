@@ -4,7 +4,7 @@ Theory of operation. Unknowns are d, the deviations of the model's own parameter
 calibration, and p, the parameters of a hypothesis (scaled to logarithms, starts or units). With the prediction errors e
 in units of the noise,
 
-    J(d, p) = (sum of e(d, p)² + d'd) / N            over the N samples to fit;  |d| <= RETUNING_BOUND,  p within bounds
+    J(d, p) = (sum of e(d, p)² + d'd) / N            over the N samples to fit;  |d| <= Tuning.bound,  p within bounds
 
 d'd is the calibration's prior: a maximum a posteriori estimate. One step solves, with S = [de/dd, de/dp],
 
@@ -27,7 +27,6 @@ from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis, move_point
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.signal import FloatArray
@@ -204,7 +203,7 @@ def take_step(
     matrix and right side, of the model's parameters, then the hypothesis's."""
     t = len(from_.deviations)
     now = np.concatenate([from_.deviations, from_.hypothesis.point])
-    low, high = (bound - now for bound in _bounds(from_.hypothesis, t))
+    low, high = (bound - now for bound in _bounds(from_.hypothesis, tuning))
     longest = _longest(from_.hypothesis)
     low[t:], high[t:] = np.maximum(low[t:], -longest), np.minimum(high[t:], longest)
     found, impossible = _first_better(measure, tuning, from_, system, (low, high), dampings)
@@ -268,9 +267,9 @@ def hypothesis_sensitivity(
     return np.array(columns).reshape(len(moves), len(errors))
 
 
-def _bounds(hypothesis: Hypothesis, tuned: int) -> tuple[FloatArray, FloatArray]:
+def _bounds(hypothesis: Hypothesis, tuning: Tuning) -> tuple[FloatArray, FloatArray]:
     own = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2)
-    widest = np.full(tuned, RETUNING_BOUND)
+    widest = np.full(len(tuning.names), tuning.bound)
     return np.concatenate([-widest, own[:, 0]]), np.concatenate([widest, own[:, 1]])
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from analysis.diagnosis.document import Errors
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import RETUNING_BOUND, RETUNING_DOUBTED, RETUNING_NAMED, SAME_TO_READERS
+from analysis.diagnosis.settings import RETUNING_DOUBTED, RETUNING_NAMED, SAME_TO_READERS
 from analysis.diagnosis.unit_wording import error_text, value_text
 from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
@@ -25,6 +25,8 @@ class MovedParameter:
     """SI; "1" for a relative change."""
     deviations: float
     """The same in standard deviations of the calibration."""
+    at_bound: bool = False
+    """It moved as far as the search lets it."""
 
     @property
     def text(self) -> str:
@@ -42,7 +44,7 @@ class MovedParameter:
 def all_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
     """deviations: (parameters,)"""
     return tuple(
-        MovedParameter(name, float(change), unit, float(deviation))
+        MovedParameter(name, float(change), unit, float(deviation), bool(abs(deviation) >= tuning.bound - 1e-6))
         for name, change, unit, deviation in zip(
             tuning.names, tuning.values(deviations), tuning.units, deviations, strict=True
         )
@@ -73,7 +75,7 @@ def doubtful_sentences(moved: Sequence[MovedParameter], fitted: bool = False) ->
     """Sentence on parameters that left the likely range of their calibration: they may compensate for physics that was
     not named. Many are only counted, because the table of parameters lists all. fitted: as in `retuned_sentence`."""
     far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
-    at_end = [number for number in far if abs(number.deviations) >= RETUNING_BOUND - 1e-6]
+    at_end = [number for number in far if number.at_bound]
     if fitted:
         names = conjoin([number.name for number in at_end])
         return (f"As far as they may, these parameters of the first model moved: {names}.{_OPEN}",) if at_end else ()

@@ -184,7 +184,8 @@ def is_worth_searching(context: SearchContext, found: Explanation, base: FittedC
         if judged_whole and len(base.fitted.hypothesis.claims) > 1 and leaves_little(found.retuned, base):
             return False
         beyond = 1.0 if context.references is None else context.references.beyond
-        return base.score.worst_channel > SEARCH_ON * beyond
+        # Opened samples are few among the others, and shown to hold a mismatch.
+        return base.score.worst_channel > (NOISE_ALONE if context.opened else SEARCH_ON) * beyond
     surprised = bool(np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     return surprised or context.references is not None or base.score.worst_channel > NOISE_ALONE
 

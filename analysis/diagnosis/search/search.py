@@ -16,6 +16,9 @@ Theory of operation.
 5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`): before a second
    effect is looked for, as a law that alone explains is a shorter description than two effects, and at the end. A law
    that was found early and leaves a part is kept where the rest of the search names nothing.
+6. Where that still leaves a mismatch, or needs three effects, and a parameter of the model is at its bound, the search
+   is repeated with a wider one, and taken if it explains, by fewer effects: a model that was fitted to this device has
+   the missing physics as a bias.
 
 Reference recordings of the intact device: see `reference/search_with_reference`. Literature: Hastie, Tibshirani and
 Friedman, The Elements of Statistical Learning (2009), section 7.2 (training, validation, test), 3.3 (stepwise).
@@ -46,6 +49,12 @@ from analysis.diagnosis.search.search_context import (
 )
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
+    MILDER_TEST_USED,
+    MODEL_MOVED,
+    NOT_SHOWN,
+    ONLY_REFINES,
+    TEST_HALF_USED,
+    TEST_PARTS_USED,
     Judgement,
     as_good_as_noise,
     confirms_addition,
@@ -69,27 +78,6 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
     if context.references is None:
         found = drop_negligible(context, found)
     return keep_identifiable(context, found, time_left)
-
-
-TEST_HALF_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
-    "such stretch was used to find it, the second half to confirm it."
-)
-TEST_PARTS_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold, each stretch in one half "
-    "alone: every other of several equal parts of each such stretch was used to find it, those between to confirm it."
-)
-MILDER_TEST_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold: all but the loudest of "
-    "it was used to find it, the loudest to confirm it."
-)
-NOT_SHOWN = "What was kept for the test shows a mismatch that the rest of the recording does not hold."
-
-
-ONLY_REFINES = (
-    "What explains it best is a law that was to be left out. Laws that hold it as a special case explain it as well, "
-    "but what they add to it does not show, so none of them is named."
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,6 +127,30 @@ def search_effects(
     beyond: Beyond = Beyond(),
 ) -> SearchResult:
     """The search for effects with its verdict."""
+    result = _search_within_calibration(context, catalogue, progress, time_left, beyond)
+    if not _may_move_further(result) or not time_left():
+        return result
+    progress("searching again, with a model that may move further", 0.1)
+    wider = replace(context, tuning=context.tuning.with_wider_bound())
+    again = _search_within_calibration(wider, catalogue, progress, time_left, Beyond())
+    fewer = result.judgement.verdict != "explained" or len(again.found.steps) < len(result.found.steps)
+    better = fewer and again.judgement.verdict == "explained"
+    return replace(again, remarks=(MODEL_MOVED, *again.remarks)) if better else result
+
+
+def _may_move_further(result: SearchResult) -> bool:
+    """Whether a mismatch is left, or three effects were needed, where a model was re-tuned as far as it may."""
+    context, found = result.context, result.found
+    left = result.judgement.verdict in ("unexplained", "partly_explained") or len(found.steps) == MOST_EFFECTS
+    fixed = found.statistic is not None or context.references is not None or context.certain
+    ends = (found.retuned, *found.steps, found.after)
+    return left and not fixed and any(context.tuning.is_at_bound(end.fitted.deviations) for end in ends)
+
+
+def _search_within_calibration(
+    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget, beyond: Beyond
+) -> SearchResult:
+    """The search with the model's own parameters within `Tuning.bound`."""
     beyond = Beyond(_guarded(beyond.before_pairs), _guarded(beyond.at_end))
     alone = add_effects(context, catalogue, begin(context, progress), progress, time_left, most=1)
     early = SearchResult(context, alone, Judgement("unexplained", False))

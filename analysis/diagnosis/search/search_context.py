@@ -15,7 +15,6 @@ from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
 from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.settings import (
     HELD_OUT_ALONE_ERROR,
-    HELD_OUT_ALONE_TIMES,
     LEAST_FITTED,
     LOUDER,
     MOST_FITTED,
@@ -146,7 +145,7 @@ def shows_there_alone(errors: FloatArray, candidate: FittedCandidate) -> bool:
     """Whether held-out samples show a mismatch that those to fit and to choose by do not. errors: (c,), there, times
     the noise."""
     shown = float(np.nanmax(errors, initial=0.0))
-    return shown > HELD_OUT_ALONE_ERROR and shown > HELD_OUT_ALONE_TIMES * candidate.score.worst_channel
+    return shown > HELD_OUT_ALONE_ERROR * max(candidate.score.worst_channel, 1.0)
 
 
 def first_fits(

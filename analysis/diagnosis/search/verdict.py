@@ -1,4 +1,4 @@
-"""The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained."""
+"""The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained; and remarks on it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +20,29 @@ from analysis.diagnosis.settings import (
     NAMED_GAIN,
     NAMED_SHARE,
     NOISE_ALONE,
+    WIDER_RETUNING_BOUND,
+)
+
+TEST_HALF_USED = (
+    "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
+    "such stretch was used to find it, the second half to confirm it."
+)
+TEST_PARTS_USED = (
+    "What was kept for the test shows something that the rest of the recording does not hold, each stretch in one half "
+    "alone: every other of several equal parts of each such stretch was used to find it, those between to confirm it."
+)
+MILDER_TEST_USED = (
+    "What was kept for the test shows something that the rest of the recording does not hold: all but the loudest of "
+    "it was used to find it, the loudest to confirm it."
+)
+NOT_SHOWN = "What was kept for the test shows a mismatch that the rest of the recording does not hold."
+ONLY_REFINES = (
+    "What explains it best is a law that was to be left out. Laws that hold it as a special case explain it as well, "
+    "but what they add to it does not show, so none of them is named."
+)
+MODEL_MOVED = (
+    f"The model's own parameters were let move by up to {WIDER_RETUNING_BOUND:g} standard deviations of their "
+    "calibration, as less left a mismatch: it may have been fitted to a device that had the missing physics already."
 )
 
 
