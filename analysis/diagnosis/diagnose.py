@@ -23,9 +23,8 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.unconfirmed import unconfirmed_candidates
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
-from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.search_by_simulation import SearchOutcome, search_by_simulation, search_context_of
 from analysis.diagnosis.settings import FAULT_BEYOND
 from analysis.diagnosis.types import Mapper, Progress

@@ -11,9 +11,9 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.search import HUM, Beyond, SearchResult, search_effects
+from analysis.diagnosis.search.search import HUM, Beyond, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import SearchResult, judge
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import Effect

@@ -19,9 +19,8 @@ from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, held_out_gain
 from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.parsimony import only_refines
-from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import Judgement, SearchResult, Unconfirmed
 from analysis.diagnosis.settings import (
     CANDIDATES_WITH_GAIN,
     FURTHER_LAW_OF_ALL,

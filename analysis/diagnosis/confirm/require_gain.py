@@ -12,9 +12,8 @@ import numpy as np
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_something
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.revise_selection import without_effect
-from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import SearchResult, Unconfirmed, judge
 from analysis.diagnosis.settings import FURTHER_LAW_OF_ALL
 
 CONSTANT = "constant_force"

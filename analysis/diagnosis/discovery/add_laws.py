@@ -19,10 +19,9 @@ from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.parsimony import leaves_far_less
-from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import is_within_data
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import SearchResult, Unconfirmed, judge
 from analysis.diagnosis.settings import HELD_OUT_ALONE_ERROR, LAW_MOST_ROUNDS, NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import AxisForce

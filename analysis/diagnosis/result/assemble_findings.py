@@ -26,9 +26,8 @@ from analysis.diagnosis.result.unconfirmed import with_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import final_errors, interval_errors
-from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import axis_letter, model_effects

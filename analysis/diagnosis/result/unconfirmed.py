@@ -8,8 +8,8 @@ from analysis.diagnosis.document import Candidate, Estimate, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.named_effects import axis_of, labels_of, law_of_claim, reported_parameters
-from analysis.diagnosis.search.search import Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate
+from analysis.diagnosis.search.verdict import Unconfirmed
 from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording

@@ -114,9 +114,10 @@ def explain(
 ) -> Explanation:
     """Re-tunes the model and adds effects one by one. time_left: asked before each piece of the search; what was found
     when it says no is kept. begun: per step of a search on fewer samples, it and its rivals; one effect is added to
-    these."""
+    these, up to `MOST_EFFECTS`."""
     found = begin(context, progress, begun)
-    return add_effects(context, catalogue, found, progress, time_left, len(found.rounds) + 1 if begun else MOST_EFFECTS)
+    most = min(len(found.rounds) + 1, MOST_EFFECTS) if begun else MOST_EFFECTS
+    return add_effects(context, catalogue, found, progress, time_left, most)
 
 
 def begin(context: SearchContext, progress: Progress, begun: Sequence[Sequence[FittedCandidate]] = ()) -> Explanation:

@@ -28,7 +28,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from analysis.diagnosis.effect_words import noun_of
-from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, begin, explain, is_worth_searching
@@ -42,6 +41,7 @@ from analysis.diagnosis.search.revise_selection import (
     exchange_for_relatives,
 )
 from analysis.diagnosis.search.search_context import (
+    FINER_PARTS,
     HALVES,
     FittedCandidate,
     SearchContext,
@@ -56,6 +56,7 @@ from analysis.diagnosis.search.verdict import (
     TEST_HALF_USED,
     TEST_PARTS_USED,
     Judgement,
+    SearchResult,
     as_good_as_noise,
     confirms_addition,
     judge,
@@ -63,7 +64,6 @@ from analysis.diagnosis.search.verdict import (
 from analysis.diagnosis.settings import EXPLAINED_ERROR, MOST_EFFECTS
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
-from equalizer.signals.signal import FloatArray
 
 LAW_BEYOND = "a law outside the catalogue"
 HUM = "mains_hum"
@@ -78,33 +78,6 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
     if context.references is None:
         found = drop_negligible(context, found)
     return keep_identifiable(context, found, time_left)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Unconfirmed:
-    """An effect that was found and is not named."""
-
-    hypothesis: Hypothesis
-    gain: float
-    """Share of the held-out error power that goes with it."""
-    why_not: str
-    claim: int = -1
-    """Which of the hypothesis's effects is meant."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchResult:
-    """Result of a search: the fits, the verdict, and candidates that are not named."""
-
-    context: SearchContext
-    """The search's shared state, with the roles of samples as used in the end."""
-    found: Explanation
-    judgement: Judgement
-    remarks: tuple[str, ...] = ()
-    errors: FloatArray | None = None
-    """`final_errors`, where the search needed them."""
-    unconfirmed: tuple[Unconfirmed, ...] = ()
-    """The largest gain first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +173,9 @@ def _search_with_pairs(
     if found.ended_early or found.barred or not shows_there_alone(left.score.test, left):
         return beyond(first)
     opened = _find_with_opened(first, left, catalogue, progress, time_left)
+    if _names_no_more(first, opened) and time_left():
+        finer = _find_with_opened(first, left, catalogue, progress, time_left, FINER_PARTS[-1])
+        opened = opened if _names_no_more(first, finer) else finer
     adds = _adds_confirmed(first, opened)
     if adds and (judged.named or opened.judgement.verdict == "explained"):
         there = beyond(opened)
@@ -227,18 +203,30 @@ def _find_beyond(
 
 
 def _find_with_opened(
-    first: SearchResult, left: FittedCandidate, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+    first: SearchResult,
+    left: FittedCandidate,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget,
+    coarsest: int = HALVES,
 ) -> SearchResult:
     """The search repeated with a part of the held-out samples to fit and to choose by: all but the loudest stretches
-    where the others show the mismatch, else the first half of each, or every other of more parts."""
-    milder = first.context.open_milder(left)
-    context, parts = first.context.open_alternate(left) if milder is None else (milder, 0)
+    where the others show the mismatch, else the first half of each, or every other of more parts. coarsest: number of
+    parts from which on stretches are cut; beyond halves, the loudest are, too."""
+    milder = first.context.open_milder(left) if coarsest == HALVES else None
+    context, parts = first.context.open_alternate(left, coarsest) if milder is None else (milder, 0)
     going_on = left is first.found.after and as_good_as_noise(first.found)
     begun = first.found.rounds[: len(first.found.steps)] if going_on else ()
     found = explain(context, catalogue, progress, time_left, begun)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     used = {0: MILDER_TEST_USED, HALVES: TEST_HALF_USED}.get(parts, TEST_PARTS_USED)
     return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
+
+
+def _names_no_more(first: SearchResult, opened: SearchResult) -> bool:
+    """Whether a search with opened samples found no effect beyond the first: these may hold too little of it, such as
+    none of the few contacts with a stop."""
+    return _sites(opened.found.after) <= _sites(first.found.after)
 
 
 def _adds_confirmed(first: SearchResult, opened: SearchResult) -> bool:

@@ -52,9 +52,9 @@ class FittedCandidate:
         return np.inf if np.isnan(left) else left
 
 
-HALVES, FINER_PARTS = 2, (8, 32)
+HALVES, FINER_PARTS = 2, (8, 32, 128)
 """Parts into which held-out stretches are cut where some are opened; finer ones only where coarser ones do not leave
-the mismatch in both. A thirty-second of some seconds is longer than errors are correlated."""
+the mismatch in both, or nothing is found with these. A 128th of some seconds is as long as a contact with a stop."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,15 +79,15 @@ class SearchContext:
     opened: bool = False
     """A part of the held-out samples is used to fit and to choose by."""
 
-    def open_alternate(self, shows: FittedCandidate) -> "tuple[SearchContext, int]":
+    def open_alternate(self, shows: FittedCandidate, coarsest: int = HALVES) -> "tuple[SearchContext, int]":
         """Copy of the context in which a part of every held-out stretch is used to fit and to choose by, and into how
         many parts stretches were cut: the first of two, or, where one half alone shows the mismatch (as of a sweep),
-        every other of more. shows: as of `open_milder`."""
-        for parts in (HALVES, *FINER_PARTS):
+        every other of more. shows: as of `open_milder`. coarsest: least number of parts that is tried."""
+        for parts in (count for count in (HALVES, *FINER_PARTS) if count >= coarsest):
             opened = [record.every_other_part(parts) for record in self.whole.records]
             if self._both_show(opened, shows):
                 return self._open(opened), parts
-        return self._open([record.every_other_part(HALVES) for record in self.whole.records]), HALVES
+        return self._open([record.every_other_part(coarsest) for record in self.whole.records]), coarsest
 
     def open_milder(self, shows: FittedCandidate) -> "SearchContext | None":
         """Copy of the context in which all held-out segments but the loudest are used to fit and to choose by, where

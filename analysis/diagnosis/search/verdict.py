@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.diagnosis.document import Verdict
+from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import leaves_little, share_of_mismatch
-from analysis.diagnosis.search.search_context import FittedCandidate
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import (
     CONFIRMED_SHARE,
     EXPLAINED_BY_CHANCE,
@@ -22,6 +23,7 @@ from analysis.diagnosis.settings import (
     NOISE_ALONE,
     WIDER_RETUNING_BOUND,
 )
+from equalizer.signals.signal import FloatArray
 
 TEST_HALF_USED = (
     "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
@@ -53,6 +55,33 @@ class Judgement:
     verdict: Verdict
     named: bool
     """The effects of `Explanation.after` are to be named."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unconfirmed:
+    """An effect that was found and is not named."""
+
+    hypothesis: Hypothesis
+    gain: float
+    """Share of the held-out error power that goes with it."""
+    why_not: str
+    claim: int = -1
+    """Which of the hypothesis's effects is meant."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchResult:
+    """Result of a search: the fits, the verdict, and candidates that are not named."""
+
+    context: SearchContext
+    """The search's shared state, with the roles of samples as used in the end."""
+    found: Explanation
+    judgement: Judgement
+    remarks: tuple[str, ...] = ()
+    errors: FloatArray | None = None
+    """`final_errors`, where the search needed them."""
+    unconfirmed: tuple[Unconfirmed, ...] = ()
+    """The largest gain first."""
 
 
 def judge(found: Explanation) -> Judgement:

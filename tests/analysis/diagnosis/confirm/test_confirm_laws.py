@@ -21,9 +21,8 @@ from analysis.diagnosis.confirm.laws_for_simulation import can_be_played, find_s
 from analysis.diagnosis.confirm.require_gain import ONLY_BESIDE_CALIBRATION, unname_doubtful_effects
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.instant import LENGTH, X_FREE, X
 
