@@ -99,9 +99,9 @@ def _diagnose_by_model(
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     if settings.fitted and balances:
         # Imported here, as above: only a model that was fitted has balances.
-        from analysis.diagnosis.confirm.measures_of_balances import choose_plain_forces
+        from analysis.diagnosis.confirm.measures_of_balances import choose_forces_of_balance
 
-        fitting = choose_plain_forces(recordings, fitting, balances)
+        fitting = choose_forces_of_balance(recordings, fitting, balances)
     if settings.fitted and is_too_short_to_name(recordings):
         unsearched = SearchOutcome(_evaluate_given_model(recordings, fitting, settings, map_), CleanFloor())
         return _assemble(recordings, settings, fitting, unsearched, balances)

@@ -31,8 +31,8 @@ def signals_of(recording: Recording) -> dict[str, Signal]:
 
 
 def segment_problems(segments: Sequence[Segment], samples: int) -> Iterator[str]:
-    """Sentences on segments outside the recording, with unknown kinds or impossible numbers, and on overlaps. samples:
-    length of the recording."""
+    """Sentences on segments outside the recording, with unknown kinds or roles, with an amplitude or period out of
+    range, and on overlaps. samples: length of the recording."""
     for number, segment in enumerate(segments, start=1):
         for problem in _problems_of_segment(segment, samples):
             yield f"segment {number} {problem}"

@@ -34,7 +34,7 @@ def list_fitting_measures(
 
     First a free simulation, or windows of one, where the fitted model allows it. Then forces along the measured motion
     with the balances' linear parameters: in the band where noise is small, if that holds most of the laws' power, and
-    in the band of the balances. compared: what the user wants compared, which leaves out the others.
+    in the band of the balances. compared: "motion" or "force" where the user wants only that compared.
     """
     if not any(balance.named for balance in balances):
         return
@@ -61,13 +61,13 @@ def list_fitting_measures(
         return  # the balances' parameters make no model, or none that can be inverted: nothing more can be tried
 
 
-def choose_plain_forces(
+def choose_forces_of_balance(
     recordings: Sequence[Recording], fitting: FittingMeasure, balances: Sequence[Balance]
 ) -> FittingMeasure:
     """The measure with the balances' own linear parameters, where forces are compared, no law is named, and these leave
-    less of the forces than the fitted model, on the samples to fit and to choose by; else `fitting` as it is. A model
-    that was fitted to spectra in closed loop may need modes that the measured motions of a second body make
-    unnecessary."""
+    less of the forces than the fitted model, on the samples to fit and to choose by; else `fitting` unchanged. A model
+    fitted to spectra in closed loop may need modes that are unnecessary where the motion of a second body is
+    measured."""
     given = fitting.chosen.measure
     named, first = any(balance.named for balance in balances), recordings[0]
     if not balances or named or is_quasi_static(first) or is_read_as_free(first):
@@ -106,7 +106,7 @@ def _predict_about_mean(recordings: Sequence[Recording], model: MechanicalModel,
 
 
 Prediction = tuple[MechanicalModel, PredictedForce]
-"""A model, and the measure by which its forces are compared."""
+"""A model, and the measure by which its predicted forces are compared with the commands."""
 
 
 def _leaves_less(linear: Prediction, given: Prediction) -> bool:

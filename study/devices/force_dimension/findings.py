@@ -64,7 +64,7 @@ def _of_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[D
         advice = "Check its power and its cable, then try again."
         findings.append(DeviceFinding("Driver", f"the library says: {error}", fine=False, advice=advice))
     finally:
-        handle.let_go()
+        handle.disconnect()
     return findings
 
 
@@ -78,7 +78,7 @@ def calibrate(name: str, patience_s: float) -> None:
             "The device was not calibrated", f"Within {patience_s:g} s the library said: {error}.", CALIBRATE
         ) from error
     finally:
-        handle.let_go()
+        handle.disconnect()
 
 
 def _usb() -> list[DeviceFinding]:

@@ -151,7 +151,7 @@ class ForceDimensionRig:
         self._closed.set()
         got = self._sending.acquire(LOCK_S)
         try:
-            self._cells[loop_cells.LET_GO] = self._handle.let_go()
+            self._cells[loop_cells.LET_GO] = self._handle.disconnect()
         finally:
             if got:
                 self._sending.release()
@@ -166,7 +166,7 @@ class ForceDimensionRig:
         if self._resting.ident is None or self._resting is threading.current_thread():
             return
         self._resting.join(JOIN_S)
-        if not self._handle.let_go():
+        if not self._handle.disconnect():
             self._cells[loop_cells.LET_GO] = 0.0
 
     def _repeat_zero_force(self) -> None:

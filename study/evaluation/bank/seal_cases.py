@@ -28,7 +28,8 @@ from study.workflows.worker_processes import worker_processes
 
 
 def truths(case: Case) -> list[dict[str, Any]]:
-    """One entry per concealed effect; empty where the model lacks nothing."""
+    """Concealed effects of a case as JSON values: name, place, axis, parameters; empty where the model lacks
+    nothing."""
     return [
         {
             "effect": truth.effect,
@@ -79,7 +80,8 @@ def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Cal
 
 
 def seal_one(folder: ProofFolder, each: Draw) -> None:
-    """Write one case; a missing label means an unfinished case."""
+    """Write one case: recording, model and settings for the diagnosis, then the label, without which the case counts as
+    unfinished."""
     place = begin_case(folder)
     case = case_of(each, place.name)
     write_recording(place / RECORDING, case.recording, precision="float32")

@@ -43,9 +43,9 @@ class CalibrationPlan:
     out: Path
     device: str = "simulated"
     radius_m: float = 0.05
-    """Of the grid around the axis x."""
+    """Radius of the grid around the x axis (m)."""
     depth_m: float = 0.04
-    """Of the grid along x, before the centre and behind it."""
+    """Extent of the grid along x, in front of the centre and behind it (m)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +74,7 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
     try:
         with linkage_of(plan.device) as linkage:
             linkage.check_frame()
-            written = _read(linkage, plan, on_progress)
+            written = _read_grid(linkage, plan, on_progress)
     except CalibrationError as error:
         raise _refusal(plan.device, error.problems) from error
     except DeviceError as error:
@@ -130,7 +130,9 @@ def calibration_lines(written: WrittenCalibration) -> tuple[str, ...]:
     )
 
 
-def _read(linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
+def _read_grid(
+    linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]
+) -> WrittenCalibration:
     """The calibration over the whole grid. All readings are checked before it is refused, so that an error can list the
     problems. Raises CalibrationError, DeviceError."""
     azimuths = arm_azimuths(_centre_jacobian(linkage))
@@ -198,8 +200,8 @@ def _refusal(name: str, problems: tuple[str, ...]) -> DeviceError:
     more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
     return DeviceError(
         TITLE,
-        f"What {name} says of its linkage cannot be: {'; '.join(problems[:SHOWN])}{more}.",
+        f"The linkage that {name} reports is inconsistent: {'; '.join(problems[:SHOWN])}{more}.",
         f"Calibrate its handle anew (`hapteq doctor --device {name} --calibrate`), try a smaller grid (--radius, "
-        "--depth) and the vendor's newest SDK; if it says the same then, do without: no other command needs it.",
+        "--depth) and the vendor's newest SDK; if the report stays the same, do without: no other command needs it.",
         saved=SAVED,
     )
