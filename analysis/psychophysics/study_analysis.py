@@ -261,7 +261,7 @@ def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
         "The published analysis is one-way: it takes every threshold as that of another person, so that differences "
         f"between people count as error: {f_text(anova.df_between, anova.df_within, anova.f)}, {p_text(anova.p)}. "
         "Every participant took every frequency; the analysis within participants takes those differences out "
-        f"({_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
+        f"({_write_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
         f"{f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon "
         f"{within.epsilon:.2f}, {p_text(within.p)}. "
         + ("Both agree at the 5 % level. " if agree else "They disagree at the 5 % level. ")
@@ -269,6 +269,6 @@ def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
     )
 
 
-def _removed_percent(within: RepeatedMeasures) -> str:
+def _write_removed_percent(within: RepeatedMeasures) -> str:
     between, error = within.ss_participants or 0.0, within.ss_error or 0.0
     return f"{100 * between / (between + error):.0f} %"

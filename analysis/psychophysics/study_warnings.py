@@ -12,7 +12,7 @@ from analysis.psychophysics.detection import directions_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.threshold_words import threshold_words
-from analysis.wording import conjoin, signed_number
+from analysis.wording import conjoin, format_signed
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
@@ -175,7 +175,7 @@ def _is_above_chance(percent_correct: float, trials: int) -> bool:
 
 def _bias_warning(rows: Sequence[Threshold]) -> str:
     leaning = [
-        f"{_run_text(row)} (criterion {signed_number(row.criterion)})"
+        f"{_run_text(row)} (criterion {format_signed(row.criterion)})"
         for row in rows
         if row.criterion is not None and _leans(row, row.criterion)
     ]
@@ -197,7 +197,7 @@ def _drift_warning(trials: Iterable[Trial]) -> str:
             sessions.setdefault((trial.subject, trial.session), {}).setdefault(trial.run, []).append(trial)
     drifts = criterion_drifts([[_answers(runs[run]) for run in sorted(runs)] for runs in sessions.values()])
     drifting = [
-        f"{subject} ({session}, criterion {signed_number(drift.per_100_trials)} per 100 trials)"
+        f"{subject} ({session}, criterion {format_signed(drift.per_100_trials)} per 100 trials)"
         for (subject, session), drift in zip(sessions, drifts, strict=True)
         if drift is not None and drift.p < DRIFT_LEVEL and drift.p_without_a_run < LEFT_OUT_LEVEL
     ]

@@ -8,7 +8,7 @@ from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.evaluation.blind_test.score import Score
 from analysis.evaluation.blind_test.share import Figure
-from analysis.evaluation.blind_test.wording import answer_text, concealed_text, figure_text, strength_text
+from analysis.evaluation.blind_test.wording import answer_text, describe_concealed, figure_text, strength_text
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
 
@@ -111,7 +111,7 @@ def _fact_points(facts: BlindTestFacts) -> tuple[str, ...]:
 def _miss_table(misses: Sequence[Outcome]) -> Table:
     rows = tuple(
         (
-            str(miss.number), f"{miss.kind}, {miss.bank}", concealed_text(miss), strength_text(miss) or "-",
+            str(miss.number), f"{miss.kind}, {miss.bank}", describe_concealed(miss), strength_text(miss) or "-",
             answer_text(miss), f"{miss.left('retuned'):.2f}", f"{miss.left('after'):.2f}",
         )
         for miss in misses

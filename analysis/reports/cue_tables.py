@@ -8,7 +8,7 @@ from analysis.psychophysics.cues.cue_findings import CueFinding, cue_warnings, g
 from analysis.psychophysics.cues.delivered_cues import CueGap
 from analysis.reports.page import Section, Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, conjoin, number, p_value, signed_number
+from analysis.wording import NONE, conjoin, format_signed, number, p_value
 from protocols.definition.staircase_rule import StaircaseRule
 
 _MEANING = (
@@ -50,8 +50,8 @@ def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
         ),
         rows=tuple(
             (
-                each.cue.value, f"{each.frequency_hz:g} Hz", signed_number(each.difference_db),
-                signed_number(each.largest_db), number(each.spread_db),
+                each.cue.value, f"{each.frequency_hz:g} Hz", format_signed(each.difference_db),
+                format_signed(each.largest_db), number(each.spread_db),
                 *(number(ability) for ability in each.abilities), number(each.observed_d_prime),
                 f"{len(each.noticed_by)} of {len(each.people)}",
             )
@@ -92,7 +92,7 @@ def _answer_table(found: Sequence[CueFinding]) -> Table:
 def _slope_texts(answers: AnswersOnDelivery) -> tuple[str, str]:
     if answers.slope is None or answers.lower is None or answers.upper is None:
         return NONE, NONE
-    return signed_number(answers.slope), f"{signed_number(answers.lower)} to {signed_number(answers.upper)}"
+    return format_signed(answers.slope), f"{format_signed(answers.lower)} to {format_signed(answers.upper)}"
 
 
 def _says(finding: CueFinding) -> str:

@@ -12,7 +12,7 @@ from analysis.diagnosis.result.ceiling_wording import (
 )
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.retuned_parameters import doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.retuned_parameters import describe_retuning, doubtful_sentences
 from analysis.diagnosis.result.wording import (
     answer_of,
     device_of,
@@ -177,7 +177,7 @@ _UNMOVED = {
 
 def _parameter_section(found: Findings) -> Section:
     moved = final_moved_parameters(found)
-    text = retuned_sentence(moved, found.fitted) or _UNMOVED[found.fitted]
+    text = describe_retuning(moved, found.fitted) or _UNMOVED[found.fitted]
     table = retuned_table(found)
     return Section(
         "The model's own parameters",

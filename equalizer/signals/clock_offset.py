@@ -56,7 +56,7 @@ def offset_by_correlation(reference: Samples, other: Samples, about_s: float, wi
     """
     rate_hz = 2 * max(1 / float(np.median(np.diff(part.times_s))) for part in (reference, other))
     first, second = (_resample_centred(part, rate_hz) for part in (reference, other))
-    correlation = _normalised_correlation(first, second)
+    correlation = _correlate_normalised(first, second)
     lags = np.arange(-(len(second) - 1), len(first))
     offsets_s = reference.times_s[0] - other.times_s[0] + lags / rate_hz
     allowed = (np.abs(offsets_s - about_s) <= within_s) & _has_enough_overlap(lags, len(first), len(second))
@@ -84,7 +84,7 @@ def _resample_centred(samples: Samples, rate_hz: float) -> FloatArray:
     return np.nan_to_num(centred, nan=0.0)
 
 
-def _normalised_correlation(first: FloatArray, second: FloatArray) -> FloatArray:
+def _correlate_normalised(first: FloatArray, second: FloatArray) -> FloatArray:
     """r of the module for signals (n,) and (m,), at each of the n + m - 1 lags -(m - 1) to n - 1."""
     # Here and below: SciPy's signal and interpolation modules take longer to import than a diagnosis that does not need
     # them.

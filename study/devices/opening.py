@@ -110,7 +110,7 @@ def _check_hand(name: str, info: DeviceInfo, settings: DeviceSettings) -> None:
     """Raises `DeviceError` where a hand is to hold what was not accepted, also where its driver is a lab's own and says
     that it is simulated: whether it is, the name decides."""
     if settings.hand_on_handle and (needs_real_time(name) or not info.simulated):
-        accepted_baseline(info, datetime.now(UTC).date())
+        find_accepted_baseline(info, datetime.now(UTC).date())
 
 
 @contextlib.contextmanager
@@ -122,9 +122,9 @@ def linkage_of(name: str) -> "Iterator[LinkageSource]":
         with vendor_linkage(name) as linkage:
             yield linkage
     elif name == SIMULATED:
-        from study.devices.simulated.own_linkage import simulated_linkage
+        from study.devices.simulated.own_linkage import make_simulated_linkage
 
-        yield simulated_linkage()
+        yield make_simulated_linkage()
     else:
         raise (
             _unknown_device(name)
@@ -230,7 +230,7 @@ def device_folder() -> Path:
     return lab_file_path().parent
 
 
-def accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
+def find_accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
     """Name in `device_folder` and SHA-256 of the recording that was accepted; empty where none was made.
 
     Raises `DeviceError` where this device was not accepted.

@@ -120,9 +120,9 @@ def _fit_allowed_size(found: TriedVariant) -> TriedVariant:
     _, fault, variant, pairs = found
     if not variant.exact:
         return found
-    return TriedVariant(fit_sizes(pairs, allowed_sizes(variant)), fault, variant, pairs)
+    return TriedVariant(fit_sizes(pairs, restrict_sizes(variant)), fault, variant, pairs)
 
 
-def allowed_sizes(variant: Variant) -> Variant:
+def restrict_sizes(variant: Variant) -> Variant:
     """The variant, with its size fixed at 1 where it is a fault at size 1 only."""
     return fix_size(variant, 0.0) if variant.exact else variant

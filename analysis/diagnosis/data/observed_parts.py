@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import Observed, measured_signals, moving_spans, roles
+from analysis.diagnosis.data.observed import Observed, find_moving_spans, roles, stack_measured_signals
 from analysis.diagnosis.settings import CHOOSE_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
@@ -27,8 +27,8 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
     tested = any(segment.role == "test" for recording in recordings for segment in recording.segments)
     found: list[Observed] = []
     for recording in recordings:
-        measured, known = measured_signals(recording, responses)
-        spans = moving_spans(recording.response.samples, parts_of(recording))
+        measured, known = stack_measured_signals(recording, responses)
+        spans = find_moving_spans(recording.response.samples, parts_of(recording))
         fit, choose, test = roles(recording.segments, len(recording), tested, spans)
         masks = (*_without_repeats(fit & known, choose & known, ~_surplus_periods(recording)), test & known)
         for start, stop in parts_of(recording):

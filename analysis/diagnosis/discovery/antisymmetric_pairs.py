@@ -67,10 +67,12 @@ def is_coupling(of: Sum) -> bool:
     return of.acts_on == "force" and len(of.terms) == 1 and bool(_COUPLED.fullmatch(f"p0*{of.terms[0].shape}"))
 
 
-def coupling_taken(tuning: Tuning, fitted: Fitted) -> float:
+def sum_squares_of_coupling(tuning: Tuning, fitted: Fitted) -> float:
     """Sum of squares of the deviations of the model's coupled damping and stiffness from their calibration."""
     m = tuning.model.inputs
-    places = [_coupled_parameter(tuning, prefix, i, j) for prefix in ("v", "") for i, j in combinations(range(m), 2)]
+    places = [
+        _find_coupled_parameter(tuning, prefix, i, j) for prefix in ("v", "") for i, j in combinations(range(m), 2)
+    ]
     return float(np.sum(fitted.deviations[places] ** 2))
 
 
@@ -94,15 +96,15 @@ def with_equal_halves(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> 
     """The fit with the two factors of each pair made opposite and equal, and what they had in common given to the
     model's coupled parameter, which does the same. Unchanged where there is no pair, or the parameter would leave its
     bounds."""
-    found = _coupled_laws(fitted, measure.records[0].recording.command.channels)
+    found = _find_coupled_laws(fitted, measure.records[0].recording.command.channels)
     values, deviations = (
-        [dict(placed.values) for placed in fitted.hypothesis.placed_effects()],
+        [dict(placed.values) for placed in fitted.hypothesis.list_placed_effects()],
         fitted.deviations.copy(),
     )
     for (prefix, axis, other), (claim, factor) in found.items():
         partner, opposite = found.get((prefix, other, axis), (claim, 0.0))
         if axis < other and factor * opposite < 0:
-            shared, number = (factor + opposite) / 2, _coupled_parameter(tuning, prefix, axis, other)
+            shared, number = (factor + opposite) / 2, _find_coupled_parameter(tuning, prefix, axis, other)
             deviations[number] -= shared / tuning.deviation[number]
             values[claim]["p0"], values[partner]["p0"] = factor - shared, opposite - shared
     if (deviations == fitted.deviations).all() or np.abs(deviations).max() > RETUNING_BOUND:
@@ -116,17 +118,17 @@ def is_taken_by_coupling(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]
     """Whether a law is linear in another axis's motion alone, and the model's own coupled damping or stiffness could
     have made half of it: always where it acts on one axis; of an antisymmetric pair, where that number would stay
     within the bound of re-tuning. inputs: command channels."""
-    found = _coupled_laws(fitted, inputs)
+    found = _find_coupled_laws(fitted, inputs)
     for (prefix, axis, other), (_, factor) in found.items():
         opposite = found.get((prefix, other, axis), (0, 0.0))[1]
         half = abs(factor - opposite) / 2 if factor * opposite < 0 else 0.0
-        number = _coupled_parameter(tuning, prefix, axis, other)
+        number = _find_coupled_parameter(tuning, prefix, axis, other)
         if half / tuning.deviation[number] - abs(fitted.deviations[number]) <= RETUNING_BOUND:
             return True
     return False
 
 
-def _coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, int, int], tuple[int, float]]:
+def _find_coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, int, int], tuple[int, float]]:
     """Claim and factor of each force that is linear in another axis's motion, by prefix of the motion, its own axis and
     the other one."""
     names, found = axis_names(inputs), {}
@@ -137,7 +139,7 @@ def _coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, in
     return found
 
 
-def _coupled_parameter(tuning: Tuning, prefix: str, axis: int, other: int) -> int:
+def _find_coupled_parameter(tuning: Tuning, prefix: str, axis: int, other: int) -> int:
     """Which of the model's parameters is the coupled damping (prefix v) or stiffness of two axes."""
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]

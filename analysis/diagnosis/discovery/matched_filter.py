@@ -112,7 +112,7 @@ class View:
 
 def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
     """One view per driven axis, then one per channel of the response that the grammar has a name for."""
-    model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects()
+    model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
     seen = tuple(_filter_record(measure, record, own) for record, own in zip(measure.records, evidence, strict=True))
     residual = np.concatenate(

@@ -234,7 +234,7 @@ def _held_out_error_share(context: SearchContext, found: Explanation, law: Fitte
 def _range_of_motion(context: SearchContext, found: Explanation, names: set[str]) -> tuple[str, ...]:
     """The largest position and speed of each axis that the law uses, held-out samples included, as text."""
     measure, fitted = context.whole, found.after.fitted
-    model, placed = context.tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects()
+    model, placed = context.tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
     letters = axis_names(measure.records[0].recording.command.channels)
     length, time = model.system.length, model.system.time

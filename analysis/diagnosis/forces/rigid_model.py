@@ -11,7 +11,7 @@ from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed_parts import observed_parts
 from analysis.diagnosis.forces.force_views import force_views
-from analysis.diagnosis.forces.inverse_dynamics import required_force
+from analysis.diagnosis.forces.inverse_dynamics import compute_required_force
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.noise_floor import noise_floor
 from analysis.diagnosis.settings import MASSLESS_SHARE, RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
@@ -64,7 +64,7 @@ def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
 def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
     rows, aims = [], []
     for record, motion in zip(measure.records, measure.motions, strict=True):
-        motion_and_force = required_force(model, motion)
+        motion_and_force = compute_required_force(model, motion)
         used = record.fit | record.choose
         columns = (
             motion_and_force.axis_acceleration,

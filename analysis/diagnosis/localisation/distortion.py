@@ -35,7 +35,7 @@ from analysis.diagnosis.data.spectral_lines import (
 )
 from analysis.diagnosis.localisation.segment_spectra import SegmentSpectrum, segment_spectra
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods
+from analysis.diagnosis.noise.periods import Periods, find_settled_periods, period_spectra
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording
@@ -97,7 +97,7 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
     floor: the recording's noise; where it is not known, no cell is evaluated and a remark says so."""
     if not floor.known:
         return Distortions((), ("The noise is not known, so no distortion can be told from it.",))
-    found = settled_periods(recording)
+    found = find_settled_periods(recording)
     excitation = instrument_signal(recording)
     held = hold_length(excitation)
     lines = [detection_lines(period_spectra(excitation, period).mean(axis=0), held) for period in found]

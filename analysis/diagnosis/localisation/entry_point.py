@@ -129,7 +129,7 @@ def entry_point(
         return EntryPoint((), rule, int(loud.sum()))
     weights = 1 / np.sqrt(np.maximum(spectra.noise.mean(axis=0), _TINY))
     bases = [_basis(entry, weights) for entry in entries]
-    lefts = [_unexplained_power(whitened, total, basis) for basis in bases]
+    lefts = [_compute_unexplained_power(whitened, total, basis) for basis in bases]
     logs = [np.log1p(left / max(channels - basis.shape[2], 1)) for left, basis in zip(lefts, bases, strict=True)]
     scores = [float(np.mean(log[loud])) for log in logs]
     ranked = sorted(range(len(entries)), key=lambda k: scores[k] + _score_penalty(rule, entries[k], bases[k].shape[2]))
@@ -157,7 +157,7 @@ def _basis(entry: Entry, weights: FloatArray) -> ComplexArray:
     return np.asarray(np.linalg.qr(directions / np.maximum(size, _TINY))[0], dtype=np.complex128)
 
 
-def _unexplained_power(whitened: ComplexArray, total: FloatArray, basis: ComplexArray) -> FloatArray:
+def _compute_unexplained_power(whitened: ComplexArray, total: FloatArray, basis: ComplexArray) -> FloatArray:
     """(experiments, lines)"""
     along = np.einsum("lck,elc->elk", basis.conj(), whitened)
     return np.asarray(np.maximum(total - np.sum(np.abs(along) ** 2, axis=2), 0.0))

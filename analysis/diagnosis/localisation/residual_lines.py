@@ -19,7 +19,7 @@ from analysis.diagnosis.data.spectral_lines import (
     octaves_between,
 )
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
-from analysis.diagnosis.noise.periods import Periods, mean_spectrum, settled_periods, spectra
+from analysis.diagnosis.noise.periods import Periods, find_settled_periods, mean_spectrum, spectra
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording, Segment
@@ -81,7 +81,7 @@ def residual_lines(recording: Recording, observation: Observation, used: Mask) -
     """Residual power by segment and band. used: (n,), the samples that count. Segments without a complete period or
     window are left out."""
     usable = used & np.isfinite(observation.measured).all(axis=1) & np.isfinite(observation.predicted).all(axis=1)
-    periods = {period.index: period for period in settled_periods(recording)}
+    periods = {period.index: period for period in find_settled_periods(recording)}
     left = observation.measured - observation.predicted
     found: list[ResidualLines] = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):

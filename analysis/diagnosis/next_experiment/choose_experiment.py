@@ -199,7 +199,7 @@ def _simulate(
     model = add_mass(model, experiment.added) if experiment.added else model
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
         simulated = simulate_mechanism(
-            model, experiment.commands, bench.sample_rate_hz, hypothesis.placed_effects(point), bench.hold
+            model, experiment.commands, bench.sample_rate_hz, hypothesis.list_placed_effects(point), bench.hold
         )
         signals = np.hstack([simulated.response, simulated.position])[:, : len(bench.noise)]
         return np.asarray((signals / bench.noise).ravel())

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
-from analysis.diagnosis.noise.periods import Periods, settled_periods
+from analysis.diagnosis.noise.periods import Periods, find_settled_periods
 from analysis.diagnosis.noise.quiet_noise import quiet_band_noise, rest_noise
 from analysis.diagnosis.noise.repeat_noise import repeat_noise, with_rounding
 from equalizer.signals.recording import Recording
@@ -49,7 +49,7 @@ class NoiseFloor:
 def noise_floor(recording: Recording) -> NoiseFloor:
     """Estimate the noise from repeated periods; else from rest; else from the lines above the driven band, assumed to
     be white; else `how` is "unknown" and every rms NaN."""
-    periods = tuple(period for period in settled_periods(recording) if period.count > 1)
+    periods = tuple(period for period in find_settled_periods(recording) if period.count > 1)
     if periods:
         return _estimate_from_repeats(recording, periods)
     rate = recording.sample_rate_hz
@@ -88,15 +88,15 @@ def _build_floor(
 def _estimate_from_repeats(recording: Recording, periods: Sequence[Periods]) -> NoiseFloor:
     lines_hz = max(periods, key=lambda period: period.length).frequency_hz(recording.sample_rate_hz)
     response = repeat_noise(recording, recording.response.samples, periods, lines_hz)
-    remarks = _varying_remarks(recording.response, response)
+    remarks = _describe_variation(recording.response, response)
     position = None
     if recording.position is not None:
         position = repeat_noise(recording, recording.position.samples, periods, lines_hz)
-        remarks += _varying_remarks(recording.position, position)
+        remarks += _describe_variation(recording.position, position)
     return NoiseFloor("repeats", lines_hz, response, position, tuple(remarks))
 
 
-def _varying_remarks(signal: Signal, noise: ChannelNoise) -> list[str]:
+def _describe_variation(signal: Signal, noise: ChannelNoise) -> list[str]:
     remarks = []
     for number, name in enumerate(signal.channels):
         left = sum(segment.varies[number] for segment in noise.segments)

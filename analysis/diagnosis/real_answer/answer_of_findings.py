@@ -49,7 +49,7 @@ def answer_of_findings(
         held_out=diagnosis.fit.test,
         black_box=None if box is None or not np.isfinite(box.test) else box.test,
         where=localisation_sentences(found.local) if found.maps else (),
-        named=named_sentences(found),
+        named=describe_named(found),
         effects=tuple(effect.effect for effect in diagnosis.effects),
         left=remainder_sentence(diagnosis, device_of(found)),
         remarks=found.remarks,
@@ -65,7 +65,7 @@ def answer_of_findings(
     )
 
 
-def named_sentences(found: Findings) -> tuple[str, ...]:
+def describe_named(found: Findings) -> tuple[str, ...]:
     """Each effect with its parameters, and what these data cannot tell from it."""
     single = found.given.inputs == 1
     return tuple(

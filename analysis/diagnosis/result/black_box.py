@@ -54,7 +54,7 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, phy
     return BlackBox(
         "polynomial of the model's signals",
         numbers * left.shape[1],
-        _normalised_error(measure, np.vstack(corrected)),
+        _normalise_error(measure, np.vstack(corrected)),
         physics,
     )
 
@@ -116,7 +116,7 @@ def _select_terms(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]
     return picked
 
 
-def _normalised_error(measure: ErrorMeasure, left: FloatArray) -> float:
+def _normalise_error(measure: ErrorMeasure, left: FloatArray) -> float:
     """Rms error over the rms signal, root mean square over channels. left: (test samples, c), in units of the
     measure."""
     size = np.maximum(signal_rms(measure.records, [record.test for record in measure.records]), _TINY)

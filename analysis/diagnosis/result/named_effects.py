@@ -204,7 +204,7 @@ LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
 
 
 def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
-    placed = whole.placed_effects(point)
+    placed = whole.list_placed_effects(point)
     first = sum(claim.groups for claim in whole.claims[:number])
     return [dict(effect.values) for effect in placed[first : first + whole.claims[number].groups]]
 

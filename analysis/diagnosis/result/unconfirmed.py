@@ -15,7 +15,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 
-def unconfirmed_candidates(
+def list_unconfirmed_candidates(
     found: Sequence[Unconfirmed], box: BlackBox | None, recording: Recording, model: MechanicalModel
 ) -> tuple[Candidate, ...]:
     """The unconfirmed effects as candidates; of several in one hypothesis the last, unless one is specified. Shares are

@@ -206,7 +206,7 @@ def sensitive_parameters(
     """Parameters whose sensitivity changes with the hypothesis's forces: those that move the axes at which these act.
     plain: sensitivity without motion-dependent forces."""
     forces = [
-        effect for effect in hypothesis.placed_effects() if isinstance(effect.effect.acts, (AxisForce, JointForce))
+        effect for effect in hypothesis.list_placed_effects() if isinstance(effect.effect.acts, (AxisForce, JointForce))
     ]
     model = tuning.tune(np.zeros(len(tuning.names)))
     if not forces or any(isinstance(force.effect.acts, JointForce) for force in forces):

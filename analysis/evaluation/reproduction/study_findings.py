@@ -7,7 +7,7 @@ from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.psychophysics.comparisons import PairDifference
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.threshold_table import frequency_name
-from analysis.wording import signed_number
+from analysis.wording import format_signed
 
 SIGNIFICANT_P = 0.05
 """Level of significance of the published analysis."""
@@ -110,7 +110,7 @@ def _rise(means: _Means, low_hz: float, high_hz: float, published: str, signific
     return Finding(
         what=f"From {low_hz:g} to {high_hz:g} Hz",
         published=published,
-        here=f"{signed_number(pair.difference)} N, p {_p_text(pair.p)} (all pairs at once)",
+        here=f"{format_signed(pair.difference)} N, p {_p_text(pair.p)} (all pairs at once)",
         value=pair.difference,
         unit="N",
         as_published=up and (pair.p < SIGNIFICANT_P) == significant,

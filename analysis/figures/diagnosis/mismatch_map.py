@@ -51,16 +51,16 @@ class _Layout:
         return np.array([column * (len(self.bands) + _GAP), row * (len(self.channels) + _GAP)])
 
 
-def driving_inputs(maps: Maps) -> tuple[str, ...]:
+def rank_driving_inputs(maps: Maps) -> tuple[str, ...]:
     """The one with most mismatch first."""
     inputs = {cell.input for cells in maps.values() for cell in cells}
     return tuple(sorted(inputs, key=lambda each: (-_worst_mismatch(maps, each), each)))
 
 
 def mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
-    """Mismatch map of one driving input. number: of the driving input in `driving_inputs`; all but the first are
+    """Mismatch map of one driving input. number: of the driving input in `rank_driving_inputs`; all but the first are
     folded. unit: of the command."""
-    input_ = driving_inputs(maps)[number]
+    input_ = rank_driving_inputs(maps)[number]
     return Picture(
         name=f"mismatch-map-{number + 1}",
         title=f"Where model and device disagree, driven by {input_}",

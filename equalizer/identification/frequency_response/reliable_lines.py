@@ -40,7 +40,8 @@ class Judgement:
 def judge_lines(
     frequency_hz: FloatArray, excited: BoolArray, coherence: FloatArray, spring_hz: float, rules: ReliabilityRules
 ) -> Judgement:
-    """Judge each line. excited: (lines,), by `excited_lines`. coherence: (lines, outputs). spring_hz: 0 = no spring."""
+    """Judge each line. excited: (lines,), by `find_excited_lines`. coherence: (lines, outputs). spring_hz: 0 = no
+    spring."""
     remarks = []
     by_spring = frequency_hz < rules.spring_margin * spring_hz
     if by_spring.any():
@@ -61,7 +62,7 @@ def judge_lines(
     return Judgement(~(by_spring | unexcited | noisy), tuple(remarks))
 
 
-def excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_energy_db: float) -> BoolArray:
+def find_excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_energy_db: float) -> BoolArray:
     """Lines at which the excitations span as many directions as there are inputs.
 
     excitation: spectra (lines, inputs, experiments). Returns a mask (lines,): where the smallest singular value of the

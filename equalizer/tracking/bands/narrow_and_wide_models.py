@@ -85,19 +85,20 @@ class BandFacts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedFeedforward:
-    """Result of `banded_feedforward`: forces from the first row on, one row per row of the wanted acceleration."""
+    """Result of `solve_banded_feedforward`: forces from the first row on, one row per row of the wanted
+    acceleration."""
 
     feedforward: Feedforward
     """Forces of all bands; their `error` is that in the middle band, by the narrow model."""
     facts: BandFacts
 
 
-def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
+def solve_banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
     """Solve for the forces of all bands. Raises ForceLimitError above the cap, TrackingError where nothing is wanted in
     the middle band or the cap leaves no solution, ValueError for an unsuitable signal or weight."""
     check_wanted(models.narrow, wanted)
     check_wanted(models.wide, wanted)
-    equalizer, rate_hz = banded_equalizer(models, settings.weight), wanted.sample_rate_hz
+    equalizer, rate_hz = make_banded_equalizer(models, settings.weight), wanted.sample_rate_hz
     below = _remove_above_band(wanted.samples, models.wide)
     played = equalizer.play(below)
     rows = played.rows_of_wanted(len(wanted))
@@ -124,7 +125,7 @@ def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardS
     return BandedFeedforward(found, _collect_facts(models, equalizer, played, below, forces))
 
 
-def banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
+def make_banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
     """Equalizer in three bands, split by linear-phase filters EDGE_ROOM_HZ beyond the narrow model's band on either
     side. weight: R = weight I, of |u|². Raises ValueError for a weight outside 1e-3 to 1e-2."""
     low, high = models.narrow.band_hz

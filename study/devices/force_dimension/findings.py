@@ -43,7 +43,7 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
     try:
         library = load_library()
     except DeviceError as error:
-        return (_failed_finding("Driver", error), *(_usb() or _unplugged()), real_time_finding(), *_sensor(lab))
+        return (_failed_finding("Driver", error), *(_usb() or _find_if_unplugged()), real_time_finding(), *_sensor(lab))
     found = DeviceFinding("Library", f"{library.path}, SDK {library.version_text}", fine=True)
     return (found, *_usb(), real_time_finding(), *_sensor(lab), *_of_device(library, MODELS[name], lab))
 
@@ -91,7 +91,7 @@ def _usb() -> list[DeviceFinding]:
     ]
 
 
-def _unplugged() -> list[DeviceFinding]:
+def _find_if_unplugged() -> list[DeviceFinding]:
     """Finding on a device that is not plugged in, where the library that would say so is missing; empty where this
     system cannot say it (no Linux)."""
     if find_usb_devices() is None:

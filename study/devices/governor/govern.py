@@ -196,7 +196,7 @@ def _record(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
         state[RECORDED] += 1
 
 
-def _publishing(sources: int) -> Any:
+def _compile_publish(sources: int) -> Any:
     @njit(PUBLISH_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def publish(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
         """After a tick and its force: one row into the telemetry ring, if it has room for any."""
@@ -252,4 +252,4 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
 _SOURCES = fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
 """Changes with each file whose code is compiled into the entry points."""
 tick, miss = _entry_points(_SOURCES)
-publish = _publishing(_SOURCES)
+publish = _compile_publish(_SOURCES)

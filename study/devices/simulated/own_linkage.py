@@ -66,7 +66,7 @@ class FittedLinkage:
     """Likewise of the inertia."""
 
 
-def simulated_linkage() -> SimulatedLinkage:
+def make_simulated_linkage() -> SimulatedLinkage:
     """Linkage of the simulated omega.3 with its default parameters."""
     parameters = Omega3Parameters()
     mass_kg = effective_mass_kg(parameters, pack_parameters(parameters, False, (0.0, 0.0, 0.0)))

@@ -33,7 +33,7 @@ def show_case(folder: ProofFolder, place: Path) -> None:
 
 
 @contextmanager
-def finished_cases(folder: ProofFolder) -> Iterator[None]:
+def finish_begun_cases(folder: ProofFolder) -> Iterator[None]:
     """Before new cases are begun: finish or remove those of a sealing that was killed. `begun` is gone afterwards."""
     _finish_begun(folder)
     yield

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from study.errors import StudyError
-from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_label, seal
 from study.evaluation.challenge.draw_bank import Draw, case_of, draw
@@ -71,7 +71,7 @@ def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Cal
     missing = [each for each in drawn if not folder.label(each.number).exists()]
     done = len(drawn) - len(missing)
     on_sealed(done)
-    with finished_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
+    with finish_begun_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
         for finished in as_completed([pool.submit(seal_one, folder, each) for each in missing]):
             finished.result()
             done += 1

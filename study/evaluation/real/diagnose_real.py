@@ -23,7 +23,7 @@ from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare
-from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, named_sentences
+from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, describe_named
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
@@ -248,7 +248,7 @@ def _compare_pair(wanted: RealRecording, case: _ImportedCase, found: Findings) -
         before=_file_names(wanted.before.files),
         after=_file_names(wanted.found.files),
         verdict=found.diagnosis.verdict,
-        named=named_sentences(found),
+        named=describe_named(found),
         returned=found.diagnosis.returned_set,
         as_before=given.without_gain,
         gain=given.with_gain,

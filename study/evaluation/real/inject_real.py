@@ -15,7 +15,7 @@ from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import Workers, ask_engine, is_answered
-from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import settings_text
@@ -70,7 +70,7 @@ def seal_injections(folder: ProofFolder, carried: Sequence[Carrier], count: int,
             "Give recordings of open loops, or leave --inject out.",
             saved="The diagnoses are written.",
         )
-    with finished_cases(folder):
+    with finish_begun_cases(folder):
         names = [_seal_injection(folder, carried, number, seed) for number in range(count)]
     seal(folder)
     return tuple(names)

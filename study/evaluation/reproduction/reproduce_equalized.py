@@ -63,7 +63,7 @@ def play_equalized(
     return _sort_rows(found, (*blended.remarks, *remarks, *_clipping_remarks(found)))
 
 
-def blending_driver(models: ModelsAtPlace) -> Driver:
+def make_blending_driver(models: ModelsAtPlace) -> Driver:
     """Driver with the weighted sum of the forces that each model computes (`ModelsAtPlace.forces`)."""
 
     def drive(wanted: Signal) -> FloatArray:
@@ -74,18 +74,18 @@ def blending_driver(models: ModelsAtPlace) -> Driver:
 
 def _rows_to_play(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, PlaybackRow]:
     """What is played for each row, by the row's key: driver, place, signal and device."""
-    centre = single_model_driver(models.centre)
-    frictionless = single_model_driver(models.frictionless)
+    centre = make_single_model_driver(models.centre)
+    frictionless = make_single_model_driver(models.frictionless)
     return {
         "plain": PlaybackRow("Not equalized, centre", not_equalized),
         "equalized": PlaybackRow("Equalized, centre", centre),
         "edge_plain": PlaybackRow("Not equalized, edge", not_equalized, EDGE),
         "edge": PlaybackRow("Edge, model of the centre", centre, EDGE),
-        "edge_blended": PlaybackRow("Edge, models blended (ours)", blending_driver(blended), EDGE),
+        "edge_blended": PlaybackRow("Edge, models blended (ours)", make_blending_driver(blended), EDGE),
         "broad_plain": PlaybackRow("Not equalized, centre, all frequencies", not_equalized, signal="multisine"),
         "broad": PlaybackRow("Equalized, centre, all frequencies", centre, signal="multisine"),
         "edge_broad": PlaybackRow(
-            "Edge, models blended (ours), all frequencies", blending_driver(blended), EDGE, signal="multisine"
+            "Edge, models blended (ours), all frequencies", make_blending_driver(blended), EDGE, signal="multisine"
         ),
         "slick_plain": PlaybackRow("Not equalized, centre, without friction", not_equalized, device=FRICTIONLESS),
         "slick": PlaybackRow("Equalized, centre, without friction", frictionless, device=FRICTIONLESS),
@@ -98,7 +98,7 @@ def _rows_to_play(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Pla
     }
 
 
-def single_model_driver(model: IdentifiedModel) -> Driver:
+def make_single_model_driver(model: IdentifiedModel) -> Driver:
     """Driver by the periodic inverse of a single model."""
     return lambda wanted: periodic_command(model, wanted).samples
 
@@ -109,7 +109,7 @@ def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRo
         at_edge = modal_interpolation(workspace).at(EDGE)
     except ModesDoNotMatchError as mismatch:
         return {}, (f"No modes were interpolated: {mismatch}.",)
-    row = PlaybackRow("Edge, modes interpolated (ours)", blending_driver(at_edge), EDGE)
+    row = PlaybackRow("Edge, modes interpolated (ours)", make_blending_driver(at_edge), EDGE)
     return {"edge_modal": row}, at_edge.remarks
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.csv_arrays import Table, read_csv_arrays, timed_arrays
+from study.importing.arrays.csv_arrays import Table, convert_times, read_csv_arrays
 from study.importing.arrays.json_arrays import read_json_arrays
 from study.importing.arrays.mat_arrays import read_mat5_arrays
 from study.importing.arrays.stored_arrays import read_hdf5_arrays, read_npz_arrays
@@ -87,7 +87,7 @@ def _read(path: Path, table: CsvMap) -> Table:
         return read_csv_arrays(path, table)
     if path.suffix.lower() in WORKBOOKS:
         return read_workbook_arrays(path, table)
-    return timed_arrays(_read_stored(path))
+    return convert_times(_read_stored(path))
 
 
 def _read_stored(path: Path) -> dict[str, Array]:

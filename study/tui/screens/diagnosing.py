@@ -11,7 +11,7 @@ from textual.screen import Screen
 from textual.widgets import Footer, ProgressBar, Static
 
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.screens.preparing import TICK_S, elapsed_words
+from study.tui.screens.preparing import TICK_S, describe_elapsed
 
 HELP = """\
 # Diagnosing
@@ -51,7 +51,7 @@ class DiagnosingScreen(Screen[bool]):
             box.border_title = "Diagnosing"
             yield Static(self._what, id="what", markup=False)
             yield ProgressBar(total=1.0, show_eta=False)
-            yield Static(elapsed_words(0.0), id="elapsed", markup=False)
+            yield Static(describe_elapsed(0.0), id="elapsed", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -67,4 +67,4 @@ class DiagnosingScreen(Screen[bool]):
         dismiss_screen(self, True)
 
     def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(elapsed_words(self._now_s() - self._began_s))
+        self.query_one("#elapsed", Static).update(describe_elapsed(self._now_s() - self._began_s))

@@ -13,7 +13,7 @@ from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.hashing import protocol_hash
 from study.devices.clock import RealClock
 from study.devices.device import Device, DeviceInfo
-from study.devices.opening import accepted_baseline, device_folder, needs_real_time, open_device
+from study.devices.opening import device_folder, find_accepted_baseline, needs_real_time, open_device
 from study.errors import DeviceError, StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_parts, local_time
@@ -204,7 +204,7 @@ def _find_last_check(info: DeviceInfo) -> DeviceFinding:
 def _digest_of_baseline(info: DeviceInfo) -> str:
     """SHA-256 of the baseline of this device's acceptance; empty where it is not accepted now."""
     try:
-        return accepted_baseline(info, datetime.now(UTC).date())[1]
+        return find_accepted_baseline(info, datetime.now(UTC).date())[1]
     except DeviceError:
         return ""
 
@@ -212,7 +212,7 @@ def _digest_of_baseline(info: DeviceInfo) -> str:
 def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recording, str]:
     """The recording of this device's acceptance, and its SHA-256. Raises DeviceError where there is none, or it is not
     comparable with a recording by this protocol."""
-    name, digest = accepted_baseline(info, datetime.now(UTC).date())
+    name, digest = find_accepted_baseline(info, datetime.now(UTC).date())
     again = f"Accept it anew: hapteq doctor --device {info.name.replace('.', '')} --timing 60 --accept 'NAME'."
     if not name:
         raise DeviceError(

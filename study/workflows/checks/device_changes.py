@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from analysis.wording import signed_number
+from analysis.wording import format_signed
 from study.session.views.views import DeviceFinding
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def _finding(kind: str, changes: Sequence["Change"], rubs: bool) -> DeviceFindin
 def _change_text(change: "Change") -> str:
     match change.kind:
         case "gain":
-            return f"{change.axis} {signed_number(100 * (change.today - 1), 1)} %"
+            return f"{change.axis} {format_signed(100 * (change.today - 1), 1)} %"
         case "response" if math.isnan(change.today):
             return f"{change.axis} not measured{_place_words(change)}"
         case "response":

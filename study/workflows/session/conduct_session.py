@@ -30,7 +30,7 @@ from study.workflows.session.open_session import (
 from study.workflows.session.resume_session import resume_session
 from study.workflows.session.run_session import run_session
 from study.workflows.trial.display import Display, Hand
-from study.workflows.trial.masking import opened_sound
+from study.workflows.trial.masking import open_masking_sound
 from study.workflows.trial.requests_port import ManyRequests, QueuedRequests, Requests
 from study.workflows.trial.session_supervisor import SessionSupervisor
 from study.workflows.trial.sitting import Pulse, Sitting, Sound, no_pulse, tell, tell_clock_steps
@@ -77,7 +77,7 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
     settings = device_settings(plan.protocol)
     with (
         _pulses(participant.clock) as pulse,
-        opened_sound(plan.protocol.masking, participant.clock, plan.observer) as sound,
+        open_masking_sound(plan.protocol.masking, participant.clock, plan.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
     ):
         _check_sensor(plan.protocol, device.info)
@@ -94,7 +94,7 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
     settings = device_settings(state.protocol)
     with (
         _pulses(participant.clock) as pulse,
-        opened_sound(state.protocol.masking, participant.clock, state.opened.observer) as sound,
+        open_masking_sound(state.protocol.masking, participant.clock, state.opened.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
     ):
         _check_sensor(state.protocol, device.info)

@@ -18,7 +18,7 @@ from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.real_report import number_sentence
 from analysis.reports.reproduction_report import render_reproduction_report
 from analysis.reports.study_report import render_study_report
-from analysis.wording import number, signed_number, typeset
+from analysis.wording import format_signed, number, typeset
 
 HYPHEN_BEFORE_NUMBER = re.compile(r"(?<![\w-])-\.?\d\S*")
 """Not in "2026-01-02" nor "gpt-2": there something stands before it."""
@@ -55,8 +55,8 @@ def assert_one_spelling(found):
 @pytest.mark.parametrize(
     ("said", "expected"),
     [
-        (number(-1.5), "−1.50"), (number(-0.001), "0.00"), (number(2.0, 0), "2"), (signed_number(-1.26, 1), "−1.3"),
-        (signed_number(1.26, 1), "+1.3"), (typeset("1e-07"), "1e−07"),
+        (number(-1.5), "−1.50"), (number(-0.001), "0.00"), (number(2.0, 0), "2"), (format_signed(-1.26, 1), "−1.3"),
+        (format_signed(1.26, 1), "+1.3"), (typeset("1e-07"), "1e−07"),
     ],
 )  # fmt: skip
 def test_a_number_is_written_with_the_minus_sign_and_a_zero_without(said, expected):

@@ -82,7 +82,7 @@ def test_dry_friction_and_presliding_are_distinguished_by_the_proposed_recording
     (experiment,) = chosen.experiments
     command = experiment.commands
     played = [
-        simulate_mechanism(bench.tuning.model, command, RATE_HZ, each.hypothesis.placed_effects())
+        simulate_mechanism(bench.tuning.model, command, RATE_HZ, each.hypothesis.list_placed_effects())
         for each in (named, rival)
     ]
     truth, other = (np.hstack([each.response, each.position]) for each in played)

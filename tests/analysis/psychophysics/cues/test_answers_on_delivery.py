@@ -8,7 +8,7 @@ from scipy.special import ndtr
 
 from analysis.psychophysics.cues.answers_on_delivery import RELYING, answers_on_delivery
 from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
-from analysis.psychophysics.cues.delivered_cues import Cue, delivered_trials
+from analysis.psychophysics.cues.delivered_cues import Cue, select_delivered_trials
 
 TRIALS = 60
 
@@ -41,7 +41,7 @@ def template(simulate):
 
 
 def slope_of(trials):
-    (group,) = delivered_trials(trials)
+    (group,) = select_delivered_trials(trials)
     (found,) = (each for each in answers_on_delivery(group) if each.cue is Cue.INTENSITY)
     return found
 
