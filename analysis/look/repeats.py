@@ -102,10 +102,10 @@ def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[C
     channels = recording.response.channels
     shares = np.array([each.share for each in noise])
     sentence = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
-    loud = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
+    noisy = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
     text = f"Between repeats (up to {max(each.periods for each in noise)}) remain at least {sentence}, rms."
-    do = f"{conjoin(loud)} hardly repeat: average more periods, or drive more." if loud else ""
-    return (Check(REPEATS, "notice" if loud else "fine", text, do),)
+    do = f"{conjoin(noisy)} hardly repeat: average more periods, or drive more." if noisy else ""
+    return (Check(REPEATS, "notice" if noisy else "fine", text, do),)
 
 
 def _period_checks(recording: Recording) -> list[Check | None]:

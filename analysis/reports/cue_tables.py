@@ -28,7 +28,7 @@ def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap], rule: Stair
 
 
 def _nothing(found: Sequence[CueFinding]) -> str:
-    blind = [f"{each.cue.value} at {each.frequency_hz:g} Hz" for each in found if not each.answers.tells]
+    blind = [f"{each.cue.value} at {each.frequency_hz:g} Hz" for each in found if not each.answers.is_conclusive]
     return (
         "No difference that was measured is one that a usual judge notices, and no answers are shown to follow what "
         "was delivered."
@@ -75,7 +75,7 @@ def _answer_table(found: Sequence[CueFinding]) -> Table:
         rows=tuple(
             (
                 each.cue.value, f"{each.frequency_hz:g} Hz", str(each.answers.trials),
-                number(each.answers.residual_sd_db, 3), *_slope_texts(each.answers), p_value(each.p_holm), _says(each),
+                number(each.answers.residual_sd_db, 3), *_slope_texts(each.answers), p_value(each.p_holm), _judge(each),
             )
             for each in found
         ),
@@ -95,7 +95,7 @@ def _slope_texts(answers: AnswersOnDelivery) -> tuple[str, str]:
     return format_signed(answers.slope), f"{format_signed(answers.lower)} to {format_signed(answers.upper)}"
 
 
-def _says(finding: CueFinding) -> str:
+def _judge(finding: CueFinding) -> str:
     if finding.followed:
         return "followed"
-    return "not followed" if finding.answers.tells else "cannot tell"
+    return "not followed" if finding.answers.is_conclusive else "cannot tell"

@@ -140,9 +140,11 @@ def _effect_section(found: Findings, number: int, pictures: Sequence[Picture]) -
 
 def _signature_pictures(found: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
     """Signatures of the effect: only those at its own axis where it has one there."""
-    mine = [number for number, signature in enumerate(found.signatures, start=1) if signature.effect == effect.effect]
-    there = [number for number in mine if found.signatures[number - 1].axis == effect.axis]
-    names = {f"signature-{number}" for number in (there or mine)}
+    of_effect = [
+        number for number, signature in enumerate(found.signatures, start=1) if signature.effect == effect.effect
+    ]
+    there = [number for number in of_effect if found.signatures[number - 1].axis == effect.axis]
+    names = {f"signature-{number}" for number in (there or of_effect)}
     return tuple(picture for picture in pictures if picture.name in names)
 
 

@@ -30,8 +30,8 @@ BEYOND_DB = 12.0
 SLOPES = tuple(float(slope) for slope in np.geomspace(0.8, 5.0, 7))
 """Slopes of the Weibull curve over newtons, equally probable a priori, spaced geometrically about 2. By hand."""
 LAPSE = 0.02
-"""Share of inattentive answers, half of them wrong, as in the other analyses: without it a single lapse at a high level
-could never be undone."""
+"""Share of inattentive answers, half of them wrong: P(right) ends at 0.99, a lapse rate of 0.01 in the words of
+`analysis.psychophysics.hierarchy.curve`. By hand: without it a single lapse at a high level could never be undone."""
 TARGET = 0.5 ** (1 / 3)
 """Share of right answers at the threshold, lapses apart: that to which the published staircase converges."""
 SAME_BITS = 1e-9

@@ -68,5 +68,5 @@ def _band(band: tuple[float, float], limit_from: Path | None) -> tuple[float, fl
     from study.workflows.equalizer.direction_limit import band_of_study
 
     found = band_of_study(limit_from, band[0])
-    typer.echo(f"Note: {found.told}", err=True)
+    typer.echo(f"Note: {found.origin}", err=True)
     return found.band_hz

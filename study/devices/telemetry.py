@@ -220,8 +220,8 @@ def _remove_abandoned_rings() -> None:
         with contextlib.suppress(OSError):
             descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
             try:
-                mine = os.fstat(descriptor).st_uid == os.getuid()
-                if mine and time.time() - os.fstat(descriptor).st_mtime > ABANDONED_AFTER_S and _lock(descriptor):
+                is_own = os.fstat(descriptor).st_uid == os.getuid()
+                if is_own and time.time() - os.fstat(descriptor).st_mtime > ABANDONED_AFTER_S and _lock(descriptor):
                     path.unlink()
             finally:
                 os.close(descriptor)

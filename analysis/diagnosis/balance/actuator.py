@@ -279,7 +279,7 @@ def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -
             f"in the command's place it takes {100 * max(gain, 0.0):.0f} % of what laws of the motion leave, not most"
         )
     # A curve of the command and a force that changes with the distance are different physics.
-    strange = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
-    if strange or len(alike) >= LARGEST_CLASS:
+    different = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
+    if different or len(alike) >= LARGEST_CLASS:
         return f"these data cannot tell it from {', '.join(alike)}"
     return "" if law.effect in EFFECTS_BY_NAME or law.formula else "no simulation of ours plays it yet"

@@ -113,8 +113,8 @@ def _leaves_less(linear: Prediction, given: Prediction) -> bool:
     """Whether the forces that the first model needs are closer to the commands than the second's: the mean over the
     axes of the error's power over the command's, on the samples to fit and to choose by of both."""
     kept = [
-        (ours.fit | ours.choose) & (other.fit | other.choose)
-        for ours, other in zip(linear[1].records, given[1].records, strict=True)
+        (own.fit | own.choose) & (other.fit | other.choose)
+        for own, other in zip(linear[1].records, given[1].records, strict=True)
     ]
     commands = np.vstack([record.command[mask] for record, mask in zip(given[1].records, kept, strict=True)])
     power = np.mean(commands**2, axis=0)

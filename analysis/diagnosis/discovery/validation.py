@@ -189,9 +189,9 @@ def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
     if not found:
         return ()
     kinds, axes = {kind for kind, _, _ in found}, {driven for _, driven, _ in found}
-    loudest = max(level for _, _, level in found)
+    strongest = max(level for _, _, level in found)
     said = [
-        (any(level > LOUDER * loudest for _, _, level in sealed), "louder commands"),
+        (any(level > LOUDER * strongest for _, _, level in sealed), "louder commands"),
         (any(driven not in axes and len(driven) > 1 for _, driven, _ in sealed), "axes driven together"),
         (any(kind not in kinds for kind, _, _ in sealed), "another kind of command"),
     ]

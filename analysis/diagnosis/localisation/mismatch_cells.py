@@ -142,12 +142,15 @@ def _cell(group: Sequence[ResidualLines], k: int, name: str, observation: Observ
         for what in ("residual", "noise", "signal")
     )
     ratio = float(np.average([part.whitened[k] for part in group], weights=lines))
-    loud, freedom = sum(float(part.signal_to_noise[k]) for part in group), max(float(observation.noise.freedom[k]), 1.0)
-    p_value = float(noncentral_f_sf(ratio, lines.sum(), freedom, 2 * allowed**2 * loud))
+    over_noise, freedom = (
+        sum(float(part.signal_to_noise[k]) for part in group),
+        max(float(observation.noise.freedom[k]), 1.0),
+    )
+    p_value = float(noncentral_f_sf(ratio, lines.sum(), freedom, 2 * allowed**2 * over_noise))
     return MismatchCell(
         name, quantity, first.input, first.band_hz, first.amplitude,
         float(np.sqrt(max(residual - noise, 0.0))), float(np.sqrt(signal)), float(np.sqrt(ratio)),
-        allowed, p_value, 1.0, float(seconds.sum()), float(lines.sum()), freedom, loud / float(lines.sum()),
+        allowed, p_value, 1.0, float(seconds.sum()), float(lines.sum()), freedom, over_noise / float(lines.sum()),
     )  # fmt: skip
 
 

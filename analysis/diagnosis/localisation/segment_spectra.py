@@ -65,8 +65,10 @@ def segment_spectra(
         for (period, lines), command, answer in zip(alike, commands, answers, strict=True):
             mean, error, spread = _mean_and_errors(answer, floor, noise.rounding / length)
             if linear is not None:
-                brought, doubt = command_contribution(linear, np.where(lines.driven[:, None], 0, command))
-                mean, error = mean - brought, error + doubt
+                contribution, contribution_error = command_contribution(
+                    linear, np.where(lines.driven[:, None], 0, command)
+                )
+                mean, error = mean - contribution, error + contribution_error
             spectrum = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
             found.append(SegmentSpectrum(inputs_of(recording, period), period.segment.amplitude, *spectrum))
     return found
@@ -132,5 +134,5 @@ def interpolate_response(response: ComplexArray) -> ComplexArray | None:
 
 def command_contribution(response: ComplexArray, command: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     """Linear response to the command's lines, and the variance of its error: both (lines, outputs)."""
-    brought = np.einsum("lij,lj->li", response, command)
-    return brought, _INTERPOLATED**2 * np.abs(brought) ** 2
+    contribution = np.einsum("lij,lj->li", response, command)
+    return contribution, _INTERPOLATED**2 * np.abs(contribution) ** 2

@@ -59,13 +59,13 @@ def noise_floor(recording: Recording) -> NoiseFloor:
     if all(rest is not None for rest in rests):
         remark = "Nothing repeats in this recording: its noise is what it shows at rest."
         return _build_floor("rest", lines_hz, [rest for rest in rests if rest is not None], signals, remark)
-    quiet = [quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
-    if all(hiss is not None for hiss in quiet):
+    undriven = [quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
+    if all(hiss is not None for hiss in undriven):
         remark = (
             "Nothing repeats in this recording and it never rests: its noise is what lies above the driven band, "
             "and was taken to be as strong below."
         )
-        return _build_floor("quiet band", lines_hz, [hiss for hiss in quiet if hiss is not None], signals, remark)
+        return _build_floor("quiet band", lines_hz, [hiss for hiss in undriven if hiss is not None], signals, remark)
     remark = "Nothing repeats in this recording, it never rests and all its band is driven: its noise is not known."
     unknown = [(np.full((len(lines_hz), signal.samples.shape[1]), np.nan), 0.0) for signal in signals]
     return _build_floor("unknown", lines_hz, unknown, signals, remark)

@@ -41,7 +41,7 @@ def repeat_noise(
     pooled = np.einsum("sc,slc->lc", weights, density) / weights.sum(axis=0)
     freedom_pooled = weights.sum(axis=0)
     varies = np.asarray(moved & ~counted)
-    floor, loud = _no_more_than_rest(recording, samples, pooled, freedom_pooled, np.asarray(varies.any(axis=0)))
+    floor, above_rest = _no_more_than_rest(recording, samples, pooled, freedom_pooled, np.asarray(varies.any(axis=0)))
     smooth = smooth_over_lines(floor, _SMOOTHED_LINES)
     smooth *= floor.mean(axis=0) / np.maximum(smooth.mean(axis=0), _TINY)
     whole, rounding = with_rounding(smooth, samples)
@@ -56,7 +56,9 @@ def repeat_noise(
         )
         for k, period in enumerate(periods)
     )
-    return ChannelNoise(np.sqrt(whole.mean(axis=0)), whole, freedom_pooled, rounding, segments, tuple(loud.tolist()))
+    return ChannelNoise(
+        np.sqrt(whole.mean(axis=0)), whole, freedom_pooled, rounding, segments, tuple(above_rest.tolist())
+    )
 
 
 def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -109,9 +111,9 @@ def _no_more_than_rest(
     hiss = fast_noise_at_rest(recording, samples)
     if hiss is None or not varied.any():
         return density, none
-    quiet = quietest(hiss.variance, hiss.freedom)
-    weights = np.where(quiet, hiss.freedom, 0.0)
+    at_rest = quietest(hiss.variance, hiss.freedom)
+    weights = np.where(at_rest, hiss.freedom, 0.0)
     rest = np.sum(weights * hiss.variance, axis=0) / weights.sum(axis=0)
     bound = fdtri(freedom, weights.sum(axis=0), 1 - _ALIKE)
-    loud = varied & (density.mean(axis=0) > bound * rest) & (rest > 0)
-    return np.where(loud, np.minimum(density, rest), density), np.asarray(loud, dtype=np.bool_)
+    above_rest = varied & (density.mean(axis=0) > bound * rest) & (rest > 0)
+    return np.where(above_rest, np.minimum(density, rest), density), np.asarray(above_rest, dtype=np.bool_)

@@ -91,15 +91,15 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
         axes.add_collection(PolyCollection(corners, facecolors=face, edgecolors=edge, linewidths=0.5, zorder=order))
     height, width = table.shape
     extent = (-0.5, width / _FINE - 0.5, height / _FINE - 0.5, -0.5)
-    loudest = _colour_limit(table)
-    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, loudest), aspect="auto",
+    largest = _colour_limit(table)
+    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, largest), aspect="auto",
                         interpolation="nearest", extent=extent)  # fmt: skip
     axes.add_collection(LineCollection(frames, colors=BLACK, linewidths=0.9, zorder=3), autolim=False)
     if len(layout.bands) <= _NUMBERS_FIT:
         _write_numbers(axes, table, panels, layout)
     _label_axes(axes, layout, unit)
     bar = figure.colorbar(image, cax=beside)
-    ratio_ticks(bar.ax.yaxis, 1.0, loudest)
+    ratio_ticks(bar.ax.yaxis, 1.0, largest)
     bar.set_label("residual / noise", fontsize=9)
     beside.tick_params(labelsize=8)
     return figure

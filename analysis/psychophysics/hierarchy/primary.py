@@ -141,14 +141,14 @@ def _compare(fit: HierarchicalFit, cap_db: float, confidence: float, declared_hz
     far = fit.means_db > cap_db + FAR_ABOVE_DB
     far_hz = tuple(frequency_hz for frequency_hz, is_far in zip(frequencies, far, strict=True) if is_far)
     # The first is the reference: from one far above the cap, another such has no difference.
-    told = ~(far & far[0]) | (np.arange(len(far)) == 0)
+    determined = ~(far & far[0]) | (np.arange(len(far)) == 0)
     declared = None
     if not set(declared_hz) <= set(far_hz):
         declared = pair_contrast(frequencies, pseudo, declared_hz, confidence, played)
     overall, converged = _overall(fit.answers, pseudo, fit.family, far)
     return _Compared(
         overall=overall,
-        contrasts=contrasts(frequencies, pseudo, confidence, played & told),
+        contrasts=contrasts(frequencies, pseudo, confidence, played & determined),
         declared=declared,
         far_above_hz=far_hz,
         converged=converged,

@@ -59,8 +59,8 @@ def _table(group: DeliveredTrials, side: float, flawless: float) -> Table:
     rounded = np.round(group.played_db)
     rows: list[Row] = []
     for level_db in np.unique(rounded[group.side == side]):
-        mine = (group.side == side) & (rounded == level_db)
-        along, across, harmonics = (_median(column[mine]) for column in columns)
+        of_level = (group.side == side) & (rounded == level_db)
+        along, across, harmonics = (_median(column[of_level]) for column in columns)
         if along is not None:
             rows.append((float(level_db), along, across or 0.0, harmonics or 0.0))
     return tuple(rows)

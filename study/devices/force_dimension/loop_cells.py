@@ -256,7 +256,7 @@ def check_still(calls: Addresses, cells: FloatArray) -> int:
     force all the same, again and again."""
     place = cells.ctypes.data + 8 * REPORTED_AT_REST
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
-    told = succeeded(call_int(calls[GIVEN], asked))
-    reported = told and not math.hypot(cells[REPORTED_AT_REST], cells[REPORTED_AT_REST + 1]) <= ODD_N
+    answered = succeeded(call_int(calls[GIVEN], asked))
+    reported = answered and not math.hypot(cells[REPORTED_AT_REST], cells[REPORTED_AT_REST + 1]) <= ODD_N
     cells[ODD_AT_REST] = cells[ODD_AT_REST] + 1.0 if reported else 0.0
     return 0 if cells[ODD_AT_REST] < ODD_FOR else record_failure(cells, GIVES_ANOTHER)

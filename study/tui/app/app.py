@@ -172,7 +172,7 @@ class HapteqApp(App[None]):
 
     def _unheard(self, panel: OutcomeScreen) -> None:
         if self._letting_go is panel:
-            panel.tell(outcomes.stop_unanswered_panel(self._words))
+            panel.show_outcome(outcomes.stop_unanswered_panel(self._words))
             self.bell()
 
     async def action_quit(self) -> None:

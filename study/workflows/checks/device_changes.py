@@ -28,15 +28,17 @@ IF_IT_STAYS = "If it stays, name the cause with `hapteq diagnose`, or accept the
 def change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ...]:
     """One for each kind, in the order in which they come."""
     kinds = dict.fromkeys(change.kind for change in changes)
-    rubs = any(change.changed for change in changes if change.kind == "friction")
-    return tuple(_finding(kind, [change for change in changes if change.kind == kind], rubs) for kind in kinds)
+    friction_changed = any(change.changed for change in changes if change.kind == "friction")
+    return tuple(
+        _finding(kind, [change for change in changes if change.kind == kind], friction_changed) for kind in kinds
+    )
 
 
-def _finding(kind: str, changes: Sequence["Change"], rubs: bool) -> DeviceFinding:
+def _finding(kind: str, changes: Sequence["Change"], friction_changed: bool) -> DeviceFinding:
     """rubs: whether the friction changed, which also changes gain and response."""
     value = f"{'; '.join(_change_text(change) for change in changes)} ({_limit_words(changes[0])})"
     axes = ", ".join(change.axis for change in changes if change.changed)
-    causes = FRICTION_FIRST if rubs and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"
+    causes = FRICTION_FIRST if friction_changed and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"
     advice = f"It changed ({axes}). {causes}"
     if axes:
         return DeviceFinding(kind.capitalize(), value, fine=False, advice=advice)

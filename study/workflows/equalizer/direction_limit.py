@@ -26,7 +26,7 @@ class BandOfStudy:
     """A frequency band that ends at the direction limit found by a study."""
 
     band_hz: tuple[float, float]
-    told: str
+    origin: str
     """Where the upper end comes from, in a sentence."""
 
 

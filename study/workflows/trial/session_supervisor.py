@@ -25,14 +25,14 @@ class SessionSupervisor:
         device: Device,
         clock: Clock,
         requests: Requests,
-        tell: Callable[[Live], None],
+        publish: Callable[[Live], None],
         buttons: tuple[int, ...] = (),
         place_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         self._device = device
         self._clock = clock
         self._requests = requests
-        self._tell = tell
+        self._publish = publish
         self._buttons = buttons
         self._place_m = place_m
         self._buttons_up = False
@@ -113,7 +113,7 @@ class SessionSupervisor:
         self._press(look, now_s)
         if due:
             self._told_s = now_s
-            self._tell(self._live_state(look))
+            self._publish(self._live_state(look))
 
     def _press(self, look: Look, now_s: float) -> None:
         down = [number for number in self._buttons if number in look.buttons]
