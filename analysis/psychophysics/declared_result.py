@@ -32,7 +32,7 @@ class ContrastResult:
     participants: tuple[int, int]
     """At the first and at the second frequency."""
     difference: float | None
-    """In `unit`, as the interval. None, as these and p, where the data do not tell it: `notes` says why."""
+    """In `unit`, as the interval. None, as these and p, where the data do not determine it: `notes` says why."""
     lower: float | None
     upper: float | None
     p: float | None

@@ -27,8 +27,8 @@ BIAS_ERRORS = 2.58
 observer without bias exceeds `STRONG_BIAS`. 1 % by chance; in 45 trials or more `STRONG_BIAS` asks more."""
 DRIFT_LEVEL, LEFT_OUT_LEVEL = 0.02, 0.2
 """Levels of the test of a drifting criterion, by session: of all runs, and of those without any one of them. Together
-they named 3 of 1000 honest simulated sessions, and 438 of 1000 whose criterion moved by 0.3 in 100 trials
-(tests/references/drift_flag.py)."""
+they named 3 of 1000 simulated sessions with a constant criterion, and 438 of 1000 whose criterion moved by 0.3 in 100
+trials (tests/references/drift_flag.py)."""
 MANY_LAPSES = 0.1
 """Lapse rate on catch trials that is worth a look; the published staircase is meant for attentive people."""
 FELT_BY_ALL_HZ = 15.0

@@ -28,14 +28,14 @@ def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap], rule: Stair
 
 
 def _nothing(found: Sequence[CueFinding]) -> str:
-    blind = [f"{each.cue.value} at {each.frequency_hz:g} Hz" for each in found if not each.answers.is_conclusive]
+    unclear = [f"{each.cue.value} at {each.frequency_hz:g} Hz" for each in found if not each.answers.is_conclusive]
     return (
         "No difference that was measured is one that a usual judge notices, and no answers are shown to follow what "
         "was delivered."
         + (
-            f" Too little varied within a direction to tell whether answers would have followed: {conjoin(blind)}. "
+            f" Too little varied within a direction to tell whether answers would have followed: {conjoin(unclear)}. "
             "A roved level (rove_db of [stimulus]) would tell for intensity."
-            if blind
+            if unclear
             else ""
         )
     )

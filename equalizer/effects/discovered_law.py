@@ -33,7 +33,7 @@ _TAKEN = {
     *(prefix + letter for letter in LETTERS for prefix in (*DERIVATIVES, COMMAND)),
 }
 LARGEST, STEEPEST = 1e15, 20.0
-"""Largest magnitude of a free number, and of an exponent."""
+"""Largest magnitude of a free parameter, and of an exponent."""
 
 
 @dataclass(frozen=True, slots=True)

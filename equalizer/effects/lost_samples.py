@@ -65,7 +65,7 @@ def _lose_positions_as_measured(
     before: FloatArray, after: FloatArray, position: FloatArray, measured: FloatArray
 ) -> FloatArray:
     """Repeats positions where the response repeats, provided that the measured position shows that the same logger read
-    it; then also where only the position tells, because the response hardly changed from one sample to the next."""
+    it; then also where only the position shows it, because the response hardly changed from one sample to the next."""
     lost = np.any(after != before, axis=1)
     if not lost.any():
         return position

@@ -32,7 +32,7 @@ NEAR_SHARE = 0.3
 """Standard deviation of the Gaussian weight around a place, as a share of the calibration's reach. Without a weight,
 far positions bend the slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
 MOST_TOLD = 10
-"""Problems at positions that are told one by one."""
+"""Number of problems at positions that are listed one by one."""
 
 
 class CalibrationError(ListedProblemsError):
@@ -73,7 +73,7 @@ class LinkageCalibration:
     inertia_kg: FloatArray
     """(n, 3, 3)"""
     gravity_n: FloatArray
-    """(n, 3); NaN where no reading and no mirror line tells it."""
+    """(n, 3); NaN where neither a reading nor a mirror line gives it."""
     filled: FloatArray
     """(n,), 1 where a mirror line gave what could not be read, else 0."""
     line_deg: FloatArray

@@ -50,7 +50,7 @@ def friction_laws(c: int, of: Scales) -> Iterator[Law]:
     values on grids of its speed and travel."""
     sharp = SHARP * of.speed
     # Stribeck velocities beyond these bounds, half the rms speed, stay as on their grid: there the law can hardly be
-    # told from Coulomb friction with quadratic damping, and refining it gains nothing.
+    # distinguished from Coulomb friction with quadratic damping, and refining it gains nothing.
     widths_of_sign, spans = friction_widths(of)
     for width in widths_of_sign:
         yield Law(

@@ -117,7 +117,7 @@ def _make_grounded_columns(motion: Motion, model: MechanicalModel, recording: Re
 def _mode_columns(
     motion: Motion, model: MechanicalModel, recording: Recording, known: Sequence[PlacedEffect]
 ) -> Iterator[FloatArray]:
-    """(n, m) each: force of one standard deviation of each number of the modes."""
+    """(n, m) each: force of one standard deviation of each parameter of the modes."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
     first = 3 * m * (m + 1) // 2
     if first == len(tuning.names):

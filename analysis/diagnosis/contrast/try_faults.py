@@ -2,7 +2,7 @@
 
 A fault of unknown size s changes the recording by s times a known column where it is small, and otherwise only near the
 size about which it was linearised. Each variant (axis, sign, corner frequency) is undone by least squares over its
-sizes, jointly with the parameters of the sound device; the best are linearised again about the size that was found, a
+sizes, jointly with the parameters of the intact device; the best are linearised again about the size that was found, a
 Gauss-Newton iteration whose step is judged by the error.
 """
 

@@ -237,7 +237,7 @@ def _impossible_model_values(model: MechanicalModel) -> Iterator[str]:
 def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     """Inputs of the model that drive nothing, or the same motion as another, and outputs that measure nothing."""
     idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
-    blind = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
+    unconnected = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
     if idle:
         yield f"the model's input lets {', '.join(idle)} drive nothing"
     elif (apart := int(np.linalg.matrix_rank(model.input))) < model.inputs:
@@ -245,8 +245,8 @@ def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> 
             f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so they cannot "
             "be told apart; make one command of those that push the same"
         )
-    if blind:
-        yield f"the model's output lets {', '.join(blind)} see nothing"
+    if unconnected:
+        yield f"the model's output lets {', '.join(unconnected)} see nothing"
 
 
 def _instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """Antisymmetric pairs: a force on one axis by the motion of another, and the opposite on that axis by the first one's.
 
 Of such a pair each half alone looks as if it were half a coupled damping or stiffness, which acts on both axes alike
-and which the model has as a number of its own: only both together are fitted. With velocities it is a gyroscopic or
+and which the model has as a separate parameter: only both together are fitted. With velocities it is a gyroscopic or
 Lorentz force, with positions a circulatory one (Merkin, Introduction to the Theory of Stability, 1997).
 """
 

@@ -141,9 +141,9 @@ def _zero_missing(left: FloatArray) -> FloatArray:
 def _parameter_columns(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence[FilteredRecord], number: int
 ) -> FloatArray:
-    """(s, m + p): effect of one standard deviation of one of the model's numbers. That of mass, damping and stiffness
-    follows from the force along the measured motion, exact however wrong the model is; that of modes from the model
-    without the hypothesis."""
+    """(s, m + p): effect of one standard deviation of one of the model's parameters. That of mass, damping and
+    stiffness follows from the force along the measured motion, exact however wrong the model is; that of modes from the
+    model without the hypothesis."""
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     if number < 3 * len(pairs):

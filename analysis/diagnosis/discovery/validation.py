@@ -124,7 +124,7 @@ def _insignificant_gain(
 
 
 def _equally_good_laws(context: SearchContext, of: Discovery, number: int) -> Iterator[str]:
-    """Laws of other variables that fit as well, that held-out data do not tell from it either, and that predict
+    """Laws of other variables that fit as well, that held-out data do not distinguish from it either, and that predict
     something else."""
     found = of.rounds[number]
     best = found.fitted_candidates[0]

@@ -4,7 +4,7 @@ channel, input, level and band. `Distortions.remarks` names the kinds that the r
 Theory of operation. A linear, time-invariant device responds to a multisine on its driven lines only. Where all of
 these are odd multiples k f0, a term of odd order in the motion (friction, backlash, a cubic spring) makes sums and
 differences of an odd number of odd lines, which are odd; a term of even order makes even lines. So the response's power
-on driven multiples that were left silent, beyond the noise, is the distortion, and its parity tells the kind. Some odd
+on driven multiples that were left silent, beyond the noise, is the distortion, and its parity shows the kind. Some odd
 lines must be left out of the excitation for that (detection lines). Per kind and band, over the silent lines S,
 
     D² = 2 L/|S| sum_S (|Y(k)|² - E|N(k)|²)     Y: mean over periods, N: its noise, L: lines that the kind reaches

@@ -46,7 +46,7 @@ class Bench:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedGain:
-    """What an experiment would tell between the named effect and a rival."""
+    """Expected discrimination between the named effect and a rival by an experiment."""
 
     experiment: Experiment
     gain: float

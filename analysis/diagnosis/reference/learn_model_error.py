@@ -82,16 +82,16 @@ def learn_model_error(
     device, alike in channels and units; the model is re-tuned to each separately, because recordings of different days
     differ. diagnosed: the recordings to diagnose, with the same measure. Raises NothingLearned where that cannot be."""
     error = measure_of(diagnosed, model, clean).measure.name
-    lessons: list[_RetunedFit] = []
+    fits: list[_RetunedFit] = []
     for number, recording in enumerate(clean):
         progress(LEARNING, LEARNED_AT * number / len(clean))
         chosen = measure_of((recording,), model, (*diagnosed, *clean))
         require_alike(chosen.measure.name, error)
-        lessons.append(_learn_from_recording(chosen, model, recording, map_))
-    floor = learn_floor([lesson.cells for lesson in lessons])
-    largest = np.max([lesson.channels for lesson in lessons], axis=0)
+        fits.append(_learn_from_recording(chosen, model, recording, map_))
+    floor = learn_floor([fit.cells for fit in fits])
+    largest = np.max([fit.channels for fit in fits], axis=0)
     floor = replace(floor, error=error, recordings=len(clean), channels=tuple(largest.tolist()))
-    return _learn_spectrum(floor, lessons, map_)
+    return _learn_spectrum(floor, fits, map_)
 
 
 def learn_model_floor(
@@ -113,25 +113,25 @@ def require_alike(learned_by: str, error: str) -> None:
         )
 
 
-def _learn_spectrum(floor: CleanFloor, lessons: Sequence[_RetunedFit], map_: Mapper) -> LearnedError:
+def _learn_spectrum(floor: CleanFloor, fits: Sequence[_RetunedFit], map_: Mapper) -> LearnedError:
     """The whitening filter of all residuals, the whitened residual's share of the signal (the largest of all
     recordings), and the clean recordings as references."""
-    residuals = [each for lesson in lessons for each in lesson.residuals]
-    whitening = whitening_filter(residuals, np.min([lesson.measure.noise for lesson in lessons], axis=0))
+    residuals = [each for fit in fits for each in fit.residuals]
+    whitening = whitening_filter(residuals, np.min([fit.measure.noise for fit in fits], axis=0))
     shares = [
-        _rms([whitening.apply(residual) for residual in lesson.residuals])
-        / _signal(lesson.measure, lesson.retuned.fitted.residuals)
-        for lesson in lessons
+        _rms([whitening.apply(residual) for residual in fit.residuals])
+        / _signal(fit.measure, fit.retuned.fitted.residuals)
+        for fit in fits
     ]
     share = np.max(shares, axis=0)
     learned = [
         reference_recording(
-            whiten_measure(count_as_noise(lesson.measure, floor), whitening, share * lesson.signal),
-            lesson.tuning,
-            lesson.retuned.fitted.deviations,
+            whiten_measure(count_as_noise(fit.measure, floor), whitening, share * fit.signal),
+            fit.tuning,
+            fit.retuned.fitted.deviations,
             map_,
         )
-        for lesson in lessons
+        for fit in fits
     ]
     return LearnedError(floor, whitening, share, ReferenceRecordings(tuple(learned), floor.beyond))
 

@@ -76,7 +76,7 @@ def class_noun(effect: NamedEffect) -> str:
 
 
 def class_sentence(effect: NamedEffect) -> str:
-    """Which laws would explain the data as well; empty where the data tell it from all others."""
+    """Which laws would explain the data as well; empty where the data distinguish it from all others."""
     inseparable = [rival.effect for rival in effect.rivals if rival.inseparable]
     names = tuple(dict.fromkeys((*_class_names(effect), *inseparable)))
     if len(names) < 2:

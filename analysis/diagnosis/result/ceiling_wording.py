@@ -56,7 +56,7 @@ def _ceiling_sentence(reached: BalanceErrors, single: bool) -> str:
     )
 
 
-_NOISE_SOURCES = {"rest": "as it is heard at rest", "quiet band": "as it is above the driven band"}
+_NOISE_SOURCES = {"rest": "as it is at rest", "quiet band": "as it is above the driven band"}
 """Ways of estimating noise other than from repeats: its level during excitation is then unknown, so errors are not
 stated in units of it."""
 

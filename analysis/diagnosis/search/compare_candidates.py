@@ -40,7 +40,7 @@ from analysis.diagnosis.settings import (
 SECOND_ROUNDS, WHOLE_ROUNDS = 4, 2
 MOST_POLISHED, POLISHED = 3, 0.002
 """Times at most that fits are polished, and share of the cost that must be gained to go on; each takes a simulation for
-every number of the model. By hand."""
+every parameter of the model. By hand."""
 MOST_REFRESHED, CONVERGED, CONVERGED_FAR, STALE = 4, 0.0005, 0.01, 0.5
 """The sensitivity to the model's parameters is recomputed so often, or until that gains no more than such a share, or,
 far above the noise, such a share of the logarithm of the error; and only where one of the parameters has moved by so

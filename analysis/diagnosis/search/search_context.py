@@ -177,8 +177,8 @@ def sensitivity_at(
     plain = sensitivity(context.measure, context.tuning, deviations, kept, context.map_)
     if not with_forces or kept is hypothesis:
         return plain
-    felt = sensitive_parameters(context.measure, context.tuning, plain, hypothesis)
-    return sensitivity(context.measure, context.tuning, deviations, hypothesis, context.map_, (plain.columns, felt))
+    sensed = sensitive_parameters(context.measure, context.tuning, plain, hypothesis)
+    return sensitivity(context.measure, context.tuning, deviations, hypothesis, context.map_, (plain.columns, sensed))
 
 
 def _worth_fitting(base: Fitted, screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
@@ -214,11 +214,11 @@ def sensitive_parameters(
     reached = np.abs(model.output @ np.linalg.solve(model.mass, model.input))
     sites = {site for force in forces for site in force.sites}
     strength = _strengths(measure, plain.columns, model.outputs)
-    felt = np.zeros(len(tuning.names), dtype=bool)
+    sensed = np.zeros(len(tuning.names), dtype=bool)
     for site in sites:
         in_channel = strength[:, int(np.argmax(reached[:, site]))]
-        felt |= in_channel > SENSED_SHARE * in_channel.max(initial=0.0)
-    return np.flatnonzero(felt).tolist()
+        sensed |= in_channel > SENSED_SHARE * in_channel.max(initial=0.0)
+    return np.flatnonzero(sensed).tolist()
 
 
 def _strengths(measure: ErrorMeasure, columns: FloatArray, outputs: int) -> FloatArray:

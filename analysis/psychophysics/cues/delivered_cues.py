@@ -50,7 +50,7 @@ class DeliveredTrials:
 
 @dataclass(frozen=True, slots=True)
 class CueGap:
-    """Trials at one frequency that tell nothing of one cue, among those with a measured amplitude."""
+    """Trials at one frequency without information on one cue, among those with a measured amplitude."""
 
     frequency_hz: float
     cue: Cue

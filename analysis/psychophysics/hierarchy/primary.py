@@ -26,7 +26,7 @@ from protocols.procedure.staircase import to_db
 CONFIDENCE = 0.95
 """Default confidence of all intervals."""
 FAR_ABOVE_DB = 6.0
-"""Of two medians that both lie this far above the cap no difference is told: the right answers are hardly more than
+"""Of two medians that both lie this far above the cap no difference is reported: the right answers are hardly more than
 chance at all levels, the sizes are extrapolated, and their differences have no known error."""
 FAR_ABOVE = "Two medians or more lie at more than twice the cap: nothing is known of their differences."
 
@@ -191,7 +191,7 @@ def answers_of(answers: Answers, chosen: NDArray[np.bool_]) -> Answers:
 
 
 def _nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[Nuisance]:
-    """What all answers of each person tell of the slope and the criterion."""
+    """Slope and criterion of each person from all answers."""
     return [
         Nuisance(person.slope, person.criterion, (fit.lapse,), *map(float, errors))
         for person, errors in zip(persons, fit.shared_errors, strict=True)

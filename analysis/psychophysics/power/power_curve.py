@@ -46,7 +46,7 @@ class Share:
     value: float
     lower: float
     upper: float
-    """Wilson's 95 % interval: how well the simulated studies tell the share."""
+    """Wilson's 95 % interval: how well the simulated studies determine the share."""
 
 
 @dataclass(frozen=True, slots=True)

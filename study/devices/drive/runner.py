@@ -168,7 +168,7 @@ class CompiledRunner:
         try:
             rig.sense(rig.state, rig.parameters, self._glance_noise, reading)
             self._seen = LastReading(reading, rig.buttons())
-        except Exception:  # noqa: BLE001 - a look hears that there is no reading
+        except Exception:  # noqa: BLE001 - a look finds no reading
             self._seen = None
 
     def run(self, ticks: int) -> None:
@@ -192,7 +192,7 @@ class CompiledRunner:
         self._governor.abandon(Fault.LOST)
 
     def cut(self) -> None:
-        """Nothing to do: no block is long, and each tick of it hears the stop."""
+        """Nothing to do: no block is long, and the stop is taken at each tick of it."""
 
     def disconnect(self) -> None:
         if self._governor.moving:

@@ -116,7 +116,7 @@ class SteppedRunner:
             return
         try:
             self._seen = LastReading(self._read(), self._rig.buttons())
-        except Exception:  # noqa: BLE001 - a look hears that there is no reading; the next tick says why
+        except Exception:  # noqa: BLE001 - a look finds no reading; the next tick says why
             self._seen = None
 
     def run(self, ticks: int) -> None:

@@ -40,7 +40,7 @@ class VirtualDrive:
         return not self._closed
 
     def stop(self) -> None:
-        """The next tick hears it; none is under way."""
+        """The next tick takes it; none is under way."""
 
     def close(self) -> None:
         """Run no more ticks when the clock moves on."""

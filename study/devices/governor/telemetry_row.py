@@ -1,7 +1,7 @@
-"""What a tick tells readers of the telemetry ring: one row, written where the oldest one was.
+"""The row of a tick in the telemetry ring, written where the oldest one was.
 
 There is one writer, the loop, which never waits: readers keep their own place and only ever read. A row that is being
-written is told by its index and its check, on any processor: no order of the stores is relied on.
+written is recognised by its index and its checksum, on any processor: no order of the stores is relied on.
 """
 
 import math

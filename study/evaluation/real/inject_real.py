@@ -83,19 +83,19 @@ def _seal_injection(folder: ProofFolder, carried: Sequence[Carrier], number: int
         return str(read_label(label)["name"])
     random = np.random.default_rng([seed, number])
     carrier = carried[number % len(carried)]
-    sound, rest = drawn_halves(carrier.recording, random)
+    intact, rest = drawn_halves(carrier.recording, random)
     effects = () if random.random() < NOTHING else _drawn_effects(rest, random)
     strength = float(random.random())
     spoiled, values = rest, dict[str, float]()
     for effect in effects:
         done = inject(spoiled, effect, strength, random)
         spoiled, values = done.recording, values | done.values
-    sound, rest, spoiled = (_nameless(without_lead(each)) for each in (sound, rest, spoiled))
-    change = held_out_change(sound, rest, spoiled) if effects else 1.0
+    intact, rest, spoiled = (_nameless(without_lead(each)) for each in (intact, rest, spoiled))
+    change = held_out_change(intact, rest, spoiled) if effects else 1.0
     place = begin_case(folder)
     (place / CLEAN).mkdir()
     write_recording(place / RECORDING, spoiled, precision="float64")
-    write_recording(place / CLEAN / RECORDING, sound, precision="float64")
+    write_recording(place / CLEAN / RECORDING, intact, precision="float64")
     write_mechanical_model(place / MODEL, carrier.model)
     write_text(place / SETTINGS, settings_text((), PROCESSOR_S))
     document = {

@@ -63,7 +63,7 @@ def left_out(array: Array) -> str:
 
 
 def read_arrays(path: Path, table: CsvMap) -> Arrays:
-    """Read all arrays of a file, whose type is told by its ending. table: how a table of text is laid out (separator,
+    """Read all arrays of a file, whose type follows from its ending. table: how a table of text is laid out (separator,
     decimal mark, header). Raises CannotReadError, ImportRefusedError."""
     try:
         open_regular(path).close()

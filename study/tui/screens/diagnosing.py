@@ -16,7 +16,7 @@ from study.tui.screens.preparing import TICK_S, describe_elapsed
 HELP = """\
 # Diagnosing
 
-The recordings are compared with the model; its own numbers are re-tuned; each effect of the catalogue that the data
+The recordings are compared with the model; its own parameters are re-tuned; each effect of the catalogue that the data
 suggest is fitted, and compared with its rivals on data that no fit has seen.
 
 **Esc** stops it. Nothing is written before the end, so nothing half done is left.

@@ -35,7 +35,8 @@ def change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ...]:
 
 
 def _finding(kind: str, changes: Sequence["Change"], friction_changed: bool) -> DeviceFinding:
-    """rubs: whether the friction changed, which also changes gain and response."""
+    """The line on one kind of change. friction_changed: whether the friction changed, too, which also changes gain and
+    response."""
     value = f"{'; '.join(_change_text(change) for change in changes)} ({_limit_words(changes[0])})"
     axes = ", ".join(change.axis for change in changes if change.changed)
     causes = FRICTION_FIRST if friction_changed and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"

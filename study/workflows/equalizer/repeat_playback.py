@@ -92,8 +92,8 @@ def _play_all(
     on_progress: OnProgress,
 ) -> None:
     begun = _start_iteration(plan, device)
-    silence = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
-    rest = read_measured_acceleration(play_forces(device, silence, lambda _: None))
+    zeros_n = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
+    rest = read_measured_acceleration(play_forces(device, zeros_n, lambda _: None))
     repetition = replace(begun.repetition, noise_floor=noise_of_rest(rest, begun.repetition))
     states.append(replace(begun, repetition=repetition, noise_floor=repetition.noise_floor))
     while states[-1].verdict is Verdict.CONTINUE and len(played) <= plan.repeats:

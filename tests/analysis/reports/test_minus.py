@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.localisation.state_regions import region_in_words
-from analysis.diagnosis.real_answer.real_answer import OwnNumber
+from analysis.diagnosis.real_answer.real_answer import OwnParameter
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.evaluation.reproduction.document import FigureFindings, PlayedRow, Reproduction
 from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.reports.diagnosis_report import render_diagnosis_report
-from analysis.reports.real_report import number_sentence
+from analysis.reports.real_report import parameter_sentence
 from analysis.reports.reproduction_report import render_reproduction_report
 from analysis.reports.study_report import render_study_report
 from analysis.wording import format_signed, number, typeset
@@ -91,7 +91,7 @@ def test_on_the_page_of_the_published_figures():
 
 def test_in_sentences():
     said = [
-        number_sentence(OwnNumber("mass", "kg", 0.9, 0.8, 1.0, 1.0)),
+        parameter_sentence(OwnParameter("mass", "kg", 0.9, 0.8, 1.0, 1.0)),
         region_in_words("position", "x", "m", (1, 1, 4), -0.012, one_stratum=True),
     ]
     assert said[1] == "near x = −12 mm"

@@ -67,8 +67,8 @@ def draw_mujoco_case(
     def again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
         further = further_plan(command, kind, rig)
         heavier = replace(device, mass_kg=device.mass_kg + added_kg)
-        felt = simulate_motion(heavier, further.command)
-        readings = read(sensing.sensor, *felt, RATE_HZ, np.random.default_rng([seed, noise]))
+        measured_motion = simulate_motion(heavier, further.command)
+        readings = read(sensing.sensor, *measured_motion, RATE_HZ, np.random.default_rng([seed, noise]))
         return replace(make_recording(name, further, *readings, rig), meta=describe_added_mass(added_kg))
 
     adds = visibility(Device(bench), sensing, (still, motion), rig) if effects else 0.0

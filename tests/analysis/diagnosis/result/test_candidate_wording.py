@@ -75,7 +75,7 @@ def test_laws_beyond_the_vocabulary_have_nouns_and_units(effect):
     assert effect not in EFFECT_WORDS
     law = LAW_WORDS[effect]
     # The parameters of a sensor are in the unit of what it reads.
-    numbers = set() if law.place == "sensor" else set(law.words.numbers) - set(law.words.shares)
+    numbers = set() if law.place == "sensor" else set(law.words.parameters) - set(law.words.shares)
     assert numbers == set(law.units)
     assert {unit_of(effect, name, system) for name in law.units for system in (LINEAR, ROTATIONAL)} != {"1"}
 

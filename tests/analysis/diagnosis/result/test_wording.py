@@ -66,7 +66,7 @@ def test_every_effect_of_the_vocabulary_has_a_name_that_people_use_and_reads_out
 def test_words_are_only_for_effects_and_numbers_that_there_are():
     for name, words in EFFECT_WORDS.items():
         known = {p.name for p in EFFECTS_BY_NAME[name].parameters}
-        assert {*words.numbers, *words.shares} <= known
+        assert {*words.parameters, *words.shares} <= known
 
 
 def test_nouns_are_distinguished():
