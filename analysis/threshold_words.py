@@ -68,5 +68,5 @@ def threshold_words(rule: StaircaseRule) -> ThresholdWords:
 
 
 def capitalised(words: str) -> str:
-    """At the beginning of a sentence."""
+    """The words with a capital first letter."""
     return f"{words[0].upper()}{words[1:]}"

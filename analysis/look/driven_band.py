@@ -68,7 +68,8 @@ def _is_moving(channel: Channel) -> bool:
 def response_coherences(
     spectra: CrossSpectra, channels: Sequence[Channel], bands: Sequence[DrivenBand]
 ) -> tuple[ResponseCoherence, ...]:
-    """Empty where nothing is driven, or too few windows were averaged."""
+    """Coherence of each response with the driven commands, by band. Empty where nothing is driven, or too few windows
+    were averaged."""
     inputs = [k for k, c in enumerate(channels) if c.role == "command" and c.name in {band.command for band in bands}]
     if not inputs or spectra.windows < 2 * len(inputs) + 2:
         return ()

@@ -124,7 +124,7 @@ def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
 
 
 def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[str, ...]:
-    """What a median above the cap leaves of the interval."""
+    """Notes on the interval of a contrast where a median lies above the cap."""
     above = [median.frequency_hz for median in primary.medians if median.above_cap and median.frequency_hz in pair_hz]
     if len(above) == 2:
         return ("Both medians are above the cap: the size of their difference is not known.",)

@@ -85,8 +85,8 @@ def comparison_text(
 
 
 def coverage_notes(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
-    """What was measured of these (names of `coverage_words.NAMES`), where the cap cut into the data; nothing of another
-    staircase than the one that was simulated."""
+    """Measured coverage of the intervals of these analyses (names of `coverage_words.NAMES`), as sentences, where the
+    cap cut into the data; empty for a staircase other than the simulated one."""
     if not table.coverage or rule != SIMULATED_RULE:
         return ()
     return tuple(filter(None, (coverage_sentence(MEASURED, name) for name in analyses)))

@@ -19,7 +19,7 @@ _MEANING = (
 
 
 def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:
-    """Empty where no trial was measured."""
+    """Section on cues other than the direction; empty where no trial was measured."""
     if not found:
         return []
     sentences = (*(cue_warnings(found) or (_nothing(found),)), *filter(None, [gap_text(gaps)]))

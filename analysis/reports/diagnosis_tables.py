@@ -49,7 +49,7 @@ def rival_table(effect: NamedEffect) -> Table:
 
 
 def candidate_table(found: Findings) -> Table | None:
-    """What was not confirmed, the best first; None where there is nothing."""
+    """Table of unconfirmed candidates, the best first; None without any."""
     device = device_of(found)
     rows = tuple(
         (
@@ -129,7 +129,7 @@ def mismatch_table(caption: str, places: Sequence[Mismatch], is_timed: bool = Tr
 
 
 def retuned_table(found: Findings) -> Table | None:
-    """All of them, folded."""
+    """Table of all re-tuned parameters, folded on the page; None where nothing was re-tuned."""
     if found.tuning is None:
         return None
     alone = all_parameters(found.tuning, found.explanation.retuned.fitted.deviations)

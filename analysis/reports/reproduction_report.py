@@ -74,7 +74,7 @@ def overview_lines(reproduction: Reproduction) -> tuple[str, ...]:
 
 
 def _models(reproduction: Reproduction) -> list[Section]:
-    """Before everything that was played through them."""
+    """Section on the models' errors, placed before the results that depend on them; empty without models."""
     if not reproduction.models:
         return []
     rows = tuple(

@@ -62,7 +62,7 @@ def identify(
 
 
 def _band(band: tuple[float, float], limit_from: Path | None) -> tuple[float, float]:
-    """As stated, or up to the direction limit of a study."""
+    """The stated band, or with `limit_from` the same band up to the direction limit of that analysis."""
     if limit_from is None:
         return band
     from study.workflows.equalizer.direction_limit import band_of_study

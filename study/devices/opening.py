@@ -115,7 +115,8 @@ def _check_hand(name: str, info: DeviceInfo, settings: DeviceSettings) -> None:
 
 @contextlib.contextmanager
 def linkage_of(name: str) -> "Iterator[LinkageSource]":
-    """What a device knows of its linkage. Nothing moves, and a real device stays braked. Raises `DeviceError`."""
+    """Source of a device's linkage: joint angles, Jacobian and inertia by position. Nothing moves, and a real device
+    stays braked. Raises `DeviceError`."""
     if name in REAL:
         from study.devices.force_dimension.linkage import vendor_linkage
 
@@ -183,7 +184,7 @@ def loop_priority() -> DeviceFinding:
 
 
 def examine_device(name: str) -> tuple[DeviceFinding, ...]:
-    """What a look at a real device's driver finds, with zero force; nothing for the others. Raises nothing."""
+    """Findings on a real device and its driver, with zero force; empty for other devices. Never raises."""
     if name not in REAL:
         return ()
     from study.devices.force_dimension.findings import examine

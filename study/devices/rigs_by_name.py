@@ -22,7 +22,7 @@ def make_simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
 
 
 def frictionless_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
-    """As `make_simulated_rig`."""
+    """The simulated omega.3 without friction. Raises as `make_simulated_rig`."""
     return _build_simulated(settings, seed, friction=False)
 
 
@@ -53,7 +53,7 @@ def _build_simulated(
 
 
 def _real_rig(name: str, settings: DeviceSettings, seed: int) -> Rig:
-    """Nothing is random in it that a seed could drive."""
+    """The rig of a real device. The seed is not used: nothing in it is random."""
     return force_dimension_rig(name, settings)
 
 

@@ -114,7 +114,8 @@ def _make_drifting_columns(c: int, sharp: float) -> Columns:
 
 
 def _read_drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-    """None where the friction would be negative somewhere in the part, and drive the motion."""
+    """Level and change from the weights w; None where the friction would be negative somewhere in the part, and drive
+    the motion."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > abs(w[1]) else None
 
 
@@ -127,8 +128,8 @@ def _position_dependent_columns(c: int, sharp: float) -> Columns:
 
 
 def _position_dependent_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-    """None where the friction would be negative at q = 0. Elsewhere the effect holds it at zero where the parabola is
-    negative."""
+    """Level, slope and curvature from the weights w; None where the friction would be negative at q = 0. Elsewhere the
+    effect holds it at zero where the parabola is negative."""
     if w[0] <= 0:
         return None
     return {"level": float(w[0]), "slope_per_m": float(w[1] / w[0]), "bend_per_m2": float(w[2] / w[0])}

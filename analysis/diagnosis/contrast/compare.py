@@ -172,8 +172,8 @@ def _undo(compared: ComparedBase, found: TriedVariant) -> tuple[list[FloatArray]
 
 
 def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
-    """For each division of one set into two stretches: the error of a base for both over that of a base for each, less
-    1. sides: per base, the set's products (blocks, k, k)."""
+    """Relative excess error within one set: for each division into two stretches, the error of a single fit to both
+    over the sum of separate fits, less 1. sides: per base, the set's products (blocks, k, k)."""
 
     def error(blocks: Sequence[int]) -> float:
         return sum(error_of_own_fit(side[list(blocks)].sum(axis=0)) for side in sides)

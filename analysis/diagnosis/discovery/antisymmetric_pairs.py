@@ -55,8 +55,8 @@ def _pair(own: Sum, partner: Sum, factor: float) -> Sum:
 
 
 def pair_starts(pair: Sum) -> tuple[Sum, ...]:
-    """Where its fit may start: where the axes are coupled, either half alone was fitted as the whole pair, beside a
-    coupled parameter of the model, and so is twice as large."""
+    """Starting values of a pair's fit: as found, and with half of the factor. Where the model couples the axes, a half
+    was fitted as the whole pair, beside a coupled parameter, and is twice too large."""
     assert pair.partner is not None
     half, opposite = pair.factors[0] / 2, replace(pair.partner, factors=(pair.partner.factors[0] / 2,))
     return pair, replace(pair, factors=(half,), partner=opposite)

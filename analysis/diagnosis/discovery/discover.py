@@ -172,7 +172,8 @@ def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
 
 
 def _views_to_search(views: Sequence[View]) -> list[View]:
-    """Of axes and of readings, the two with the largest excess error each at most, the largest first."""
+    """Views in which laws are searched: of axes and of readings at most two each, those with the largest excess error,
+    the largest first."""
     found: list[View] = []
     for acts_on in ("force", "response"):
         missing = [(_excess(view), view.output) for view in views if view.acts_on == acts_on]

@@ -96,8 +96,9 @@ def _like_best(
 def put_plainest_first(
     context: SearchContext, pairs: Sequence[tuple[FittedCandidate, Sum]]
 ) -> list[tuple[FittedCandidate, Sum]]:
-    """By error; but first comes, of those that these data cannot tell from the best, the one with fewest parameters; of
-    forces that are linear in another axis's motion, the one that asks least of the model's own coupled parameters."""
+    """The candidates by rising error, with the preferred one moved to the front: among those inseparable from the best,
+    the one with the fewest parameters; among forces that are linear in another axis's motion, the one with the smallest
+    change of the model's own coupled parameters."""
     ranked = sorted(pairs, key=lambda pair: pair[0].score.mean_log_error)
     alike = [pair for pair in ranked if inseparable(ranked[0][0], pair[0])]
     first = min(alike, key=_count_parameters)
@@ -108,7 +109,8 @@ def put_plainest_first(
 
 
 def _count_parameters(pair: tuple[FittedCandidate, Sum]) -> int:
-    """Free numbers of a sum, without exponents that are whole or half numbers, and a soft limit's factor of 1."""
+    """Number of free parameters of a sum, without exponents that are whole or half numbers, and a soft limit's factor
+    of 1."""
     candidate, of = pair
     law = laws_of(candidate.fitted.hypothesis)[-1]
     count = 0 if law is None else -int(is_whole_limit(law, LAW_NEAR))

@@ -172,7 +172,8 @@ def does_as_well_with_less(context: SearchContext, of: Discovery, rival: FittedC
 
 
 def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
-    """In what the held-out stretches differ from those in which laws are found; empty where they are alike. A segment
+    """Words for how the held-out stretches differ from those in which laws are found (stronger commands, axes driven
+    together, another kind of command); empty where they are alike. A segment
     of which only the end is held out counts as both; rest counts as neither."""
     found: list[tuple[str, tuple[int, ...], float]] = []
     sealed: list[tuple[str, tuple[int, ...], float]] = []
@@ -206,8 +207,8 @@ def _describe_segment(segment: Segment, command: FloatArray) -> tuple[str, tuple
 def proof_sentence(
     context: SearchContext, found: Explanation, rivals: Sequence[FittedCandidate], chosen_of: int = 1
 ) -> str:
-    """On what a named law was tested, its error beside that of the best of the catalogue, how many laws fitted alike,
-    and the range of motion beyond which it is unknown, as one to three sentences."""
+    """One to three sentences: on which data a named law was tested, its error beside that of the best of the catalogue,
+    how many laws fitted alike, and the range of motion beyond which it is unknown."""
     whole, after = context.whole, found.after
     laws = [law for law in laws_of(after.fitted.hypothesis) if law is not None]
     where = conjoin(held_out_kinds(whole.records))

@@ -72,7 +72,8 @@ def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray,
 
 
 def quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
-    """Which rows do not differ significantly from the quietest of their column. Both (rows, channels)."""
+    """Mask (rows, channels) of the variances that do not differ significantly from the smallest of their column (F
+    test). variance, freedom: (rows, channels), variances and their degrees of freedom."""
     least = np.argmin(variance, axis=0)
     columns = np.arange(variance.shape[1])
     bound = fdtri(freedom, freedom[least, columns], 1 - _ALIKE)

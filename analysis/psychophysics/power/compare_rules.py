@@ -107,7 +107,8 @@ def _result(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int
 
 
 def play(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> tuple[float, StaircaseState, float]:
-    """True threshold (dB), the run's last state, and the highest level played (N)."""
+    """Simulate a run of a person drawn from the crowd. key: seeds the draws. Returns the true threshold (dB re 1 N),
+    the last state, and the highest level played (N)."""
     random = np.random.default_rng(key)
     spread = crowd.frequency_sd_db if isinstance(crowd.frequency_sd_db, float) else crowd.frequency_sd_db[0]
     true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, spread) * random.standard_normal()

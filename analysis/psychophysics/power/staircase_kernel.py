@@ -158,19 +158,20 @@ def look_again(middle: float, lapse: float, unsure: float, left: int) -> tuple[b
 
 
 class RunFound(NamedTuple):
-    """What a run came to."""
+    """Result of a simulated run."""
 
     trials: int
     reversals: int
     mean_db: float = math.nan
-    """Of the threshold's posterior, for a run by Psi, as the next."""
+    """Mean of the threshold's posterior (dB re 1 N), for a run by Psi only, as the next."""
     above_cap: float = math.nan
     """Probability that the threshold lies above the cap."""
 
 
 @njit(cache=True)
 def give_answer(person: Participant, level_db: float, trial: int, left: int) -> tuple[float, bool, int]:
-    """What is shown (1 or -1) at the trial of the run, whether the answer is right, and how many repeats are left."""
+    """Simulate the answer at a trial. Returns the direction shown (1 or -1), whether the answer is right, and the
+    number of repeats that are left."""
     s = 1.0 if np.random.random() < 0.5 else -1.0
     felt = felt_db(person, level_db, s > 0.0, trial)
     a = evidence(person.t0 + person.pace_per_db * (felt - person.threshold_db), person.family) - s * (

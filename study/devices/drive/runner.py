@@ -98,7 +98,7 @@ class Runner(Protocol):
 
     @property
     def seen(self) -> LastReading | None:
-        """What was read last, by a tick or a glance. None before that, and where the rig is gone. From any thread."""
+        """The last reading, by a tick or a glance. None before that, and where the rig is gone. From any thread."""
         ...
 
     def prepare(self) -> None:
@@ -172,7 +172,7 @@ class CompiledRunner:
             self._seen = None
 
     def run(self, ticks: int) -> None:
-        """In blocks of `block_ticks`; after each, the reading is kept for `seen`."""
+        """Run ticks in blocks of `block_ticks`; after each, the reading is kept for `seen`."""
         try:
             for start in range(0, ticks, self._block_ticks):
                 self._run_block(min(self._block_ticks, ticks - start))
@@ -183,7 +183,7 @@ class CompiledRunner:
             self.give_up(error)
 
     def drop(self, fault: Fault) -> None:
-        """One tick is run after it, in which the rig is given zero force."""
+        """End with this fault; one more tick is run, in which the rig is given zero force."""
         self._governor.abandon(fault)
         self._run_block(1)
 

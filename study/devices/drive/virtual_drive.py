@@ -34,7 +34,7 @@ class VirtualDrive:
         """Nothing can hang: ticks run in the caller's own thread."""
 
     def refresh(self) -> bool:
-        """Before a look: whether what the runner saw last is of now."""
+        """Update the last reading before it is looked at. Returns whether it is current."""
         if not (self._runner.moving or self._closed):
             self._runner.glance()
         return not self._closed

@@ -132,8 +132,8 @@ def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float
 
 @part
 def _wake_device(calls: Addresses, cells: FloatArray) -> int:
-    """After a silence that was longer than the watchdog. In the middle of a force that is an end; with none it is
-    not: the computer was asleep, or nothing was played."""
+    """Check the device after a pause longer than its watchdog. While a force acts, the pause ends the stimulus; without
+    one it does not: the computer was asleep, or nothing was played."""
     code = check_on(calls, cells)
     if code >= 0:
         return code

@@ -133,7 +133,8 @@ def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
 
 @part
 def _limit_slew(state: FloatArray, settings: FloatArray, force: FloatArray) -> bool:
-    """Both ends of the step lie within the cap, and a ball is convex: so does what is left of the step."""
+    """Shorten the step from the last force to the slew limit. Both ends lie within the cap, and a ball is convex: so
+    does the shortened step. Returns whether it was beyond the limit by more than rounding."""
     x, y, z = force[0] - state[FORCE], force[1] - state[FORCE + 1], force[2] - state[FORCE + 2]
     step = norm_of(x, y, z)
     if step > settings[SLEW_STEP] * WITHIN:

@@ -44,7 +44,8 @@ from study.devices.governor.compiling import part
 
 @part
 def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
-    """After `tick`, which has counted the tick already. ring (1 + rows, RING_WIDTH): a header, then the rows."""
+    """Write the row of a tick into the ring; called after `tick`, which has counted the tick already. ring (1 + rows,
+    RING_WIDTH): a header, then the rows."""
     count = ring[0, RING_COUNT]
     row = ring[1 + int(count) % (ring.shape[0] - 1)]
     aims = state[PHASE] in (PLAYING, RELEASING)

@@ -93,7 +93,8 @@ def list_remaining(folder: SessionFolder) -> tuple[str, ...]:
 
 
 def how_to_finish(folder: SessionFolder) -> str:
-    """Empty if a withdrawal is complete; otherwise what remains, and the command that continues."""
+    """Sentence on what remains of an incomplete withdrawal, and the command that continues it; empty if it is
+    complete."""
     left = list_remaining(folder)
     if not left and folder.tombstone.exists() and not folder.withdrawal.exists():
         return ""

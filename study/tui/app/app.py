@@ -94,7 +94,7 @@ class HapteqApp(App[None]):
         return self._engine.pid
 
     def close_engine(self) -> None:
-        """After `run`: wait until the device has released the force and the log is closed."""
+        """Wait until the device has released the force and the log is closed. Called after `run`."""
         self._watching.end()
         self._engine.close()
         if self._sitting is not None:
@@ -102,7 +102,7 @@ class HapteqApp(App[None]):
 
     @property
     def _words(self) -> Words:
-        """Of the participant who sits here."""
+        """Texts in the language of the participant of this sitting."""
         return ENGLISH_WORDS if self._sitting is None else self._sitting.words
 
     async def _begin_sitting(self, first: Begin | Resume) -> None:

@@ -103,7 +103,7 @@ class ContactPlay:
 def play_contact(
     plan: ContactPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving = refuse_unannounced
 ) -> ContactPlay:
-    """Reads, solves, plays and writes. on_progress: told the share that is played. before_moving: see
+    """Reads, solves, plays and writes. on_progress: called with the share played. before_moving: see
     `BeforeMoving`. Raises StudyError, before anything moves for what cannot be played; nothing is written then."""
     require_new_folder(plan.out)
     normal = _unit(plan.normal)

@@ -18,7 +18,7 @@ PLAYING = ("trial", "demo", "probe", "reference")
 
 
 class SessionSupervisor:
-    """One per sitting. `glance` is the sign of life of every wait; `resolve` tells afterwards what ended it."""
+    """One per sitting. `glance` is the sign of life of every wait; `resolve` returns afterwards what ended it."""
 
     def __init__(
         self,
@@ -80,7 +80,7 @@ class SessionSupervisor:
                     self._notes.append(request)
 
     def resolve(self, reply: Reply) -> Reply:
-        """What actually ended the wait, where the display only knows that it ended."""
+        """The reply of a wait: what ended it, where the display only knows that it ended."""
         if self.stop_asked is not None:
             return Unanswered(f"the {self.stop_asked} stopped the session", leave=True)
         if isinstance(reply, Answered):

@@ -24,7 +24,7 @@ class Pulse(Protocol):
 
     @property
     def line(self) -> str:
-        """Which line, in words."""
+        """Description of the output line, for the log."""
         ...
 
     @property

@@ -53,10 +53,10 @@ class Outlet(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SideTasks:
-    """What else is done between two looks at the log."""
+    """Tasks between two readings of the log."""
 
     on_offset: Callable[[float], None]
-    """Told the offset of the clocks at first, and whenever it has changed by `NOTED_S`."""
+    """Called with the offset of the clocks at first, and whenever it has changed by `NOTED_S`."""
     push_signals: Callable[[float], int]
     """Given that offset: sends what the device's loop did meanwhile, and answers how many ticks were lost."""
 
