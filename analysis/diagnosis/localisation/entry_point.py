@@ -33,10 +33,10 @@ _BLOCK_LINES = 8
 _TINY = np.finfo(np.float64).tiny
 
 
-# A mismatch of the response without one of the position belongs to the response sensor: a force would move both.
 @dataclass(frozen=True, slots=True)
 class SensorRule:
-    """Comparison of the position's residual with the motion that the response's residual would mean if it were real."""
+    """Comparison of the position's residual with the motion that the response's residual would mean if it were real: a
+    force would move both, so that a residual of the response alone is an error of its sensor."""
 
     verdict: Literal["response sensor", "motion", "undecided"]
     expected: float

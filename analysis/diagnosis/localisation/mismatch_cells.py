@@ -173,11 +173,12 @@ def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
     return CleanFloor({key: beyond * share for key, share in shares.items()}, recordings=len(clean))
 
 
-# Hierarchical multiple testing: the false discovery rate is controlled family by family. Families nest (channel, then
-# band, then cell). A family's own p-value is Simes' of its members. Members are tested only where their family was
-# found, at a level lowered by the share of families that were found (Benjamini and Bogomolov 2014).
 def adjust_nested_p_values(p_values: FloatArray, families: Sequence[tuple[Hashable, ...]], level: float) -> FloatArray:
     """Adjusted p-values (tests,): found are those up to `level`.
+
+    Hierarchical multiple testing: the false discovery rate is controlled family by family. Families nest (channel, then
+    band, then cell). A family's own p-value is Simes' of its members. Members are tested only where their family was
+    found, at a level lowered by the share of families that were found (Benjamini and Bogomolov 2014).
 
     families: one path per test, widest family first; paths of equal length. The test is the last, innermost member.
     """

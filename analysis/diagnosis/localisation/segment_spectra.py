@@ -105,11 +105,11 @@ def _linear_response(
     return None if clean else interpolate_response(line_responses(driven, [answer.mean(axis=0) for answer in answers]))
 
 
-# The command's content on silent lines: under feedback the device's distortion returns through the command,
-# and a linear device responds to it, too.
 def line_responses(commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]) -> ComplexArray:
     """(lines, outputs, inputs): the linear response at lines where the experiments drive every direction; NaN
-    elsewhere. commands: each (lines, inputs), zero where not driven; responses: each (lines, outputs)."""
+    elsewhere. commands: each (lines, inputs), zero where not driven; responses: each (lines, outputs). With it the part
+    of the response is subtracted that the command causes on silent lines: under feedback distortion returns through the
+    command."""
     inputs, outputs = np.stack(commands, axis=1), np.stack(responses, axis=1)
     size = np.linalg.svd(inputs, compute_uv=False)
     usable = (inputs.shape[1] >= inputs.shape[2]) & (size[:, -1] > _LEAST_INDEPENDENCE * size[:, 0])

@@ -234,10 +234,10 @@ def _stretches(mask: Mask) -> tuple[tuple[int, int], ...]:
     return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
 
 
-# Rows of the residual where impacts are compared by band power: no simulation predicts single impacts.
 def impact_remainder(measure: ErrorMeasure, found: Explanation) -> tuple[Mismatch, ...]:
     """One row for each channel whose band powers differ by more than chance; the share is the rms logarithm of the
-    ratio of amplitudes. Empty where samples were compared."""
+    ratio of amplitudes. For impacts, which are compared by band power because no simulation predicts single ones; empty
+    where samples were compared."""
     if found.statistic is None:
         return ()
     record, score = measure.records[0].recording, found.after.score

@@ -31,7 +31,7 @@ REFINING = {
     "drifting_force": ("constant_force",),
 }
 """Laws that are not simulated, and the special cases that each contains."""
-# Why a candidate is not named, as the document says it: PLAINER, ALIKE and BEYOND.
+# PLAINER, ALIKE and BEYOND: reasons for which a candidate is not named, as the document states them.
 PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further parameters are open"
 ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")

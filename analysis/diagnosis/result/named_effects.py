@@ -209,10 +209,10 @@ def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[
     return [dict(effect.values) for effect in placed[first : first + whole.claims[number].groups]]
 
 
-# Probability of each candidate, from the differences of their log errors.
 def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> tuple[float, ...]:
-    """One probability each, with a sum below 1; the first candidate is the preferred one, and its refinements count for
-    it. left: errors of the whole explanation in the worst channel, in units of the noise."""
+    """Probability of each candidate, proportional to exp(-excess mean log error / PROBABILITY_SCALE), with a sum below
+    1; the first candidate is the preferred one, and its refinements count for it. left: errors of the whole explanation
+    in the worst channel, in units of the noise."""
     if not fitted_candidates:
         return ()
     best = fitted_candidates[0]
@@ -225,6 +225,7 @@ def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> 
 
 
 def probability_of_none(left: float) -> float:
-    """The probability that no candidate is right, although none in the catalogue is better."""
+    """Probability that no candidate is right: a logistic function of the logarithm of left - 1, from ELSEWHERE_LEAST to
+    ELSEWHERE_MOST. left: error of the explanation in the worst channel, in units of the noise."""
     odds = (max(left - 1.0, 0.0) / ELSEWHERE_HALFWAY) ** ELSEWHERE_STEEPNESS
     return float(ELSEWHERE_LEAST + (ELSEWHERE_MOST - ELSEWHERE_LEAST) * odds / (1 + odds))

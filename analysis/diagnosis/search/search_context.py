@@ -199,7 +199,6 @@ def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedH
     return [entry for _, entry in sorted(ranked, key=lambda pair: pair[0])]
 
 
-# Selects the model's parameters that matter for a force at an axis: those that change how that axis moves.
 def sensitive_parameters(
     measure: ErrorMeasure, tuning: Tuning, plain: Sensitivity, hypothesis: Hypothesis
 ) -> list[int]:
