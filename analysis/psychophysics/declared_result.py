@@ -7,7 +7,7 @@ from typing import Literal
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.hierarchy.primary import FAR_ABOVE, PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
-from analysis.threshold_words import capitalised, threshold_words
+from analysis.threshold_words import capitalise_first, threshold_words
 from analysis.wording import conjoin
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule
@@ -81,7 +81,7 @@ def declared_result(
                 comparisons,
                 table,
                 declared.primary == "published",
-                TUKEY.format(means=capitalised(threshold_words(rule).means)),
+                TUKEY.format(means=capitalise_first(threshold_words(rule).means)),
             ),
         ]
         results.sort(key=lambda result: not result.declared)

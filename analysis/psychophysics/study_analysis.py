@@ -233,7 +233,7 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "mean_contrasts_db": [asdict(contrast) for contrast in analysis.mean_contrasts],
         "tobit_contrasts_db": [asdict(contrast) for contrast in analysis.tobit],
         "declared": asdict(analysis.protocol.analysis),
-        "declared_result": _declared_document(analysis.declared_result),
+        "declared_result": _write_declared_result(analysis.declared_result),
         "compared": analysis.compared,
         "cues": [asdict(cue) for cue in analysis.cues],
         "cue_gaps": [asdict(gap) for gap in analysis.cue_gaps],
@@ -241,7 +241,7 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
     }
 
 
-def _declared_document(result: DeclaredResult) -> dict[str, Any]:
+def _write_declared_result(result: DeclaredResult) -> dict[str, Any]:
     """What was left out as a number: its sentences name sessions of people who withdrew."""
     document = asdict(result)
     document["left_out_count"] = len(document.pop("left_out"))

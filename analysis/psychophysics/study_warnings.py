@@ -45,18 +45,18 @@ def study_warnings(
     if not rows:
         return ("No test trial is there, so there is no threshold of direction.",)
     candidates = (
-        _stopped_warning(rows, protocol.staircase),
+        _warn_of_stopped(rows, protocol.staircase),
         _incomplete_warning(rows, protocol.staircase),
-        _missing_warning(table),
-        _censored_warning(table, protocol.staircase),
+        _warn_of_missing(table),
+        _warn_of_censored(table, protocol.staircase),
         _few_participants_warning(table),
         _unequal_sizes_warning(table),
         _chance_warning(rows),
         _bias_warning(rows),
         _drift_warning(trials),
-        _spoiled_warning(trials),
-        _flagged_warning(trials),
-        _unmeasured_warning(trials),
+        _warn_of_spoiled(trials),
+        _warn_of_flagged(trials),
+        _warn_of_unmeasured(trials),
         *table.notes,
     )
     return tuple(sentence for sentence in candidates if sentence)
@@ -75,7 +75,7 @@ def side_warnings(
         if broken
         else "",
         f"{_count_text(cut, 'detection threshold')} cut by the cap: {conjoin(cut)}." if cut else "",
-        _undetected_warning(detection),
+        _warn_of_undetected(detection),
         _below_detection_warning(table, felt),
         *felt.notes,
     )
@@ -91,7 +91,7 @@ def _incomplete_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     return f"{_count_text(cut, 'run')} not complete and without a threshold: {conjoin(cut)}." if cut else ""
 
 
-def _stopped_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
+def _warn_of_stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     stopped = [
         f"{_run_text(row)} ({_progress(row, rule)}, {row.trials_at_cap} trials at the cap)"
         for row in rows
@@ -113,12 +113,12 @@ def _progress(row: Threshold, rule: StaircaseRule) -> str:
     return f"{row.reversals} of {rule.reversals} reversals"
 
 
-def _missing_warning(table: ThresholdTable) -> str:
+def _warn_of_missing(table: ThresholdTable) -> str:
     gaps = [f"{subject} at {frequency:g} Hz" for subject, frequency in table.gaps()]
     return f"No threshold for {conjoin(gaps)}." if gaps else ""
 
 
-def _censored_warning(table: ThresholdTable, rule: StaircaseRule) -> str:
+def _warn_of_censored(table: ThresholdTable, rule: StaircaseRule) -> str:
     cut = [
         f"{subject} at {frequency:g} Hz"
         for subject, row in zip(table.subjects, table.censored, strict=True)
@@ -213,19 +213,19 @@ def _answers(run: Sequence[Trial]) -> tuple[list[int], list[bool]]:
     return [trial.direction_shown for trial in run], [bool(trial.correct) for trial in run]
 
 
-def _spoiled_warning(trials: Iterable[Trial]) -> str:
+def _warn_of_spoiled(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.SPOILED for trial in trials)
     return f"{count} spoiled presentation{'s' if count != 1 else ''}, played again; the answers do not count." * bool(
         count
     )
 
 
-def _flagged_warning(trials: Iterable[Trial]) -> str:
+def _warn_of_flagged(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.FLAGGED for trial in trials)
     return f"{count} trial{'s' if count != 1 else ''} flagged: counted, but the stimulus is worth a look." * bool(count)
 
 
-def _unmeasured_warning(trials: Iterable[Trial]) -> str:
+def _warn_of_unmeasured(trials: Iterable[Trial]) -> str:
     count = sum(trial.counts and trial.delivered_mps2 is None for trial in trials)
     if not count:
         return ""
@@ -252,7 +252,7 @@ def _lapse_warning(catches: Sequence[CatchTally]) -> str:
     )
 
 
-def _undetected_warning(detection: Sequence[Threshold]) -> str:
+def _warn_of_undetected(detection: Sequence[Threshold]) -> str:
     guessed = _runs_at_chance(detection)
     return f"Detection not shown to be better than chance: {conjoin(guessed)}." if guessed else ""
 

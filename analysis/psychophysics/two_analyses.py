@@ -8,7 +8,7 @@ from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
-from analysis.threshold_words import capitalised, threshold_words
+from analysis.threshold_words import capitalise_first, threshold_words
 from analysis.wording import conjoin, format_signed, p_text
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
@@ -101,7 +101,7 @@ def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: Stair
     if not pairs:
         return f"The model tells no difference to {against}."
     if not any(mean for _, mean in pairs):
-        return f"{capitalised(named)} tell no difference to {against} yet that could be held against the model's."
+        return f"{capitalise_first(named)} tell no difference to {against} yet that could be held against the model's."
     apart = [
         f"at {contrast.frequency_hz:g} Hz {format_signed(contrast.difference_db, 1)} dB against "
         f"{format_signed(mean.difference_db, 1)} dB"

@@ -84,8 +84,8 @@ def _follow_up_sections(found: Sequence[FollowUp]) -> tuple[Section, ...]:
     rows = tuple(
         (
             str(each.number), each.effect, ", ".join(each.returned), each.proposed or "nothing would tell",
-            _returned_text(each.proposed, each.after_proposed), each.drawn or "-",
-            _returned_text(each.drawn, each.after_drawn),
+            _describe_returned(each.proposed, each.after_proposed), each.drawn or "-",
+            _describe_returned(each.drawn, each.after_drawn),
         )
         for each in found
     )  # fmt: skip
@@ -95,7 +95,7 @@ def _follow_up_sections(found: Sequence[FollowUp]) -> tuple[Section, ...]:
     return (Section("The next experiment", tables=(table,)),)
 
 
-def _returned_text(recorded: str, returned: Sequence[str]) -> str:
+def _describe_returned(recorded: str, returned: Sequence[str]) -> str:
     return (", ".join(returned) or "no name") if recorded else "-"
 
 

@@ -7,7 +7,7 @@ from analysis.wording import NONE, format_signed, p_text, p_value
 NAMES = {"hierarchical": "hierarchical model of all answers", "published": "published one-way analysis"}
 
 
-def declared_section(declaration: str, result: DeclaredResult) -> Section:
+def make_declared_section(declaration: str, result: DeclaredResult) -> Section:
     """The section on the declared result. declaration: what was declared and what was not, in words. Where nothing was,
     the section is this alone."""
     heading = "The declared result"

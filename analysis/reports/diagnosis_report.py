@@ -7,8 +7,8 @@ from analysis.diagnosis.localisation.localisation_words import localisation_sent
 from analysis.diagnosis.result.ceiling_wording import (
     black_box_beats,
     black_box_sentence,
-    ceiling_sentences,
     confirmation_sentence,
+    describe_ceiling,
 )
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.plausibility import implausible_sentences
@@ -35,8 +35,8 @@ from analysis.reports.diagnosis_tables import (
     error_table,
     mismatch_table,
     parameter_table,
-    retuned_table,
     rival_table,
+    tabulate_retuned,
 )
 from analysis.reports.page import Page, Section, Table, render_page
 from analysis.wording import capitalise
@@ -103,7 +103,7 @@ def _candidate_sections(found: Findings) -> list[Section]:
 
 def _black_box_sections(found: Findings) -> list[Section]:
     text = black_box_sentence(found.black_box, bool(found.diagnosis.effects))
-    paragraphs = tuple(filter(None, (*ceiling_sentences(found.reached), text)))
+    paragraphs = tuple(filter(None, (*describe_ceiling(found.reached), text)))
     return [Section("A black box beside it", paragraphs=paragraphs)] if paragraphs else []
 
 
@@ -180,7 +180,7 @@ _UNMOVED = {
 def _parameter_section(found: Findings) -> Section:
     moved = final_moved_parameters(found)
     text = describe_retuning(moved, found.fitted) or _UNMOVED[found.fitted]
-    table = retuned_table(found)
+    table = tabulate_retuned(found)
     return Section(
         "The model's own parameters",
         paragraphs=(text,),

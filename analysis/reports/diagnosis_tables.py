@@ -128,7 +128,7 @@ def mismatch_table(caption: str, places: Sequence[Mismatch], is_timed: bool = Tr
     return Table(caption, header, rows, notes, folded=True)
 
 
-def retuned_table(found: Findings) -> Table | None:
+def tabulate_retuned(found: Findings) -> Table | None:
     """Table of all re-tuned parameters, folded on the page; None where nothing was re-tuned."""
     if found.tuning is None:
         return None

@@ -8,7 +8,7 @@ from analysis.diagnosis.unit_wording import error_text, value_text
 from analysis.evaluation.blind_test.injected import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import error_rows
 from analysis.figures.picture import Picture
-from analysis.reports.injected_section import injected_section
+from analysis.reports.injected_section import make_injected_section
 from analysis.reports.page import Page, Section, Table, render_page
 from analysis.wording import typeset
 
@@ -46,7 +46,7 @@ def render_real_report(
         )
     sections += [_section(answer, pictures.get((answer.folder, answer.recording))) for answer in answers]
     if injected:
-        sections.append(injected_section(injected))
+        sections.append(make_injected_section(injected))
     named = sum(bool(answer.effects) for answer in answers)
     return render_page(
         Page(

@@ -8,7 +8,7 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.population import Population
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.cue_tables import cue_section
-from analysis.reports.declared_section import declared_section
+from analysis.reports.declared_section import make_declared_section
 from analysis.reports.methods_text import methods_text
 from analysis.reports.page import Page, Section, render_page
 from analysis.reports.primary_tables import primary_section
@@ -98,7 +98,7 @@ def _declared(analysis: StudyAnalysis) -> list[Section]:
     """Section on the declared (preregistered) contrast, the first of the report; empty without frequencies."""
     if not analysis.protocol.stimulus.frequencies_hz:
         return []
-    return [declared_section(analysis.declared, analysis.declared_result)]
+    return [make_declared_section(analysis.declared, analysis.declared_result)]
 
 
 def _models(qualities: Sequence[tuple[str, str]]) -> list[Section]:

@@ -169,7 +169,7 @@ def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(LETTERS[: len(channels)])
 
 
-def reading_names(channels: Channels) -> tuple[str, ...]:
+def names_of_readings(channels: Channels) -> tuple[str, ...]:
     """Names of the response's channels in a formula: ax, ay, az of accelerations, or as the recording calls them."""
     found: dict[int, str] = {}
     for name, number in _response_signals(channels).items():

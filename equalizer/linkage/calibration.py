@@ -100,7 +100,7 @@ def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
     at_places = [
         problem
         for number, filled in enumerate(calibration.filled)
-        for problem in reading_problems(
+        for problem in check_reading(
             LinkageReading(*(getattr(calibration, name)[number] for name in shapes)), gravity_known=not filled
         )
     ]
@@ -124,7 +124,7 @@ def difference_problems(difference: float) -> Iterator[str]:
         )
 
 
-def reading_problems(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
+def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
     """One sentence each."""
     where = "(" + ", ".join(f"{1000 * each:.0f}" for each in reading.position_m) + ") mm"
     jacobian, inertia = reading.jacobian, reading.inertia_kg

@@ -9,7 +9,7 @@ from equalizer.signals.recording import SEGMENT_KINDS, SEGMENT_ROLES, Recording,
 from equalizer.signals.signal import FloatArray, Signal
 
 
-def recording_problems(recording: Recording) -> tuple[str, ...]:
+def check_recording(recording: Recording) -> tuple[str, ...]:
     """Sentences, one for everything that contradicts the format. Empty = consistent. NaN counts as missing, not as
     wrong."""
     found = [*_signal_problems(recording), *segment_problems(recording.segments, len(recording))]

@@ -17,7 +17,7 @@ from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.forces.inverse_dynamics import band_motion, compute_required_force
@@ -42,7 +42,7 @@ def find_balances_beside_model(
     recordings: Sequence[Recording], model: MechanicalModel, without: frozenset[str], time_left: TimeBudget
 ) -> tuple[Balance, ...]:
     """One balance per command; empty where not each command drives a measured position or velocity."""
-    records = observed_parts(recordings, model.outputs)
+    records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
         return ()
     try:

@@ -17,7 +17,7 @@ LEAST_SAMPLES = 32
 """Least samples of a part."""
 
 
-def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
+def observe_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
     """Parts of all recordings, ready for comparison. responses: number of position channels that belong to the model's
     outputs. Roles are those of the whole set: where any recording is marked for the test, no other gives up samples for
     it; where all are marked as test, none is held out."""
@@ -40,7 +40,7 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
 
 def samples_to_fit(recordings: Sequence[Recording]) -> int:
     """Number of samples to fit that have a response, and a position where there is one per response channel."""
-    return sum(int(record.fit.sum()) for record in observed_parts(recordings, len(recordings[0].response.channels)))
+    return sum(int(record.fit.sum()) for record in observe_parts(recordings, len(recordings[0].response.channels)))
 
 
 def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:

@@ -194,7 +194,7 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
     strength = np.maximum(strength, 1e-9 * strength.max(axis=0))
     share = 2 * (last - 1) / length
     # What a force does near the end is cut off there.
-    end = n - min(_settling_samples(measure, evidence), n // 4)
+    end = n - min(_count_settling_samples(measure, evidence), n // 4)
     kept = tuple(slice(int(a * share), int(min(b, end) * share)) for a, b in _blocks(record) if a < end)
     forces = isinstance(measure, PredictedForce)
     units = measure.unit[: 0 if forces else evidence.response.shape[1]]
@@ -211,7 +211,7 @@ def _force_response(measure: ErrorMeasure, evidence: Evidence, lines: FloatArray
     return np.asarray(np.concatenate([seen.response, seen.position], axis=1)[:, :c] / measure.unit[:, None])
 
 
-def _settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
+def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
     """Samples until the response to a force has decayed."""
     if isinstance(measure, PredictedForce):
         return 0

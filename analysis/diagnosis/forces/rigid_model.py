@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.measured_motion import has_motion
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.forces.force_views import force_views
 from analysis.diagnosis.forces.inverse_dynamics import compute_required_force
 from analysis.diagnosis.forces.predicted_force import PredictedForce
@@ -39,7 +39,7 @@ def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
     """Least-squares model with one body per command. Raises MechanicalModelError where the forces give no positive
     mass."""
     model = _unit_masses(recordings[0], name)
-    records = observed_parts(recordings, model.outputs)
+    records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
         raise MechanicalModelError(("neither positions nor velocities were measured",))
     floors = [noise_floor(record.recording) for record in records]

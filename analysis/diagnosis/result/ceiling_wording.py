@@ -32,12 +32,12 @@ def black_box_beats(box: BlackBox) -> bool:
     return box.test * SAME_TO_READERS < box.physics
 
 
-def ceiling_sentences(reached: Sequence[BalanceErrors]) -> tuple[str, ...]:
+def describe_ceiling(reached: Sequence[BalanceErrors]) -> tuple[str, ...]:
     """One sentence per axis whose force balance was tested."""
-    return tuple(_ceiling_sentence(each, len(reached) == 1) for each in reached)
+    return tuple(_describe_ceiling_of_axis(each, len(reached) == 1) for each in reached)
 
 
-def _ceiling_sentence(reached: BalanceErrors, single: bool) -> str:
+def _describe_ceiling_of_axis(reached: BalanceErrors, single: bool) -> str:
     along = "" if single else f" along {reached.axis}"
     if not reached.tested:
         return (

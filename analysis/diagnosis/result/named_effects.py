@@ -148,14 +148,14 @@ def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: t
 
 def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, labels: Labels) -> dict[str, Estimate]:
     claim = whole.claims[number]
-    at = reported_parameters(whole, number, whole.point)
+    at = report_parameters(whole, number, whole.point)
     spread = {name: 0.0 for name in at}
     for coordinate in range(own.start, own.stop):
         if not np.isfinite(errors[coordinate]):
             continue
         moved = whole.point.copy()
         moved[coordinate] += errors[coordinate]
-        for name, value in reported_parameters(whole, number, moved).items():
+        for name, value in report_parameters(whole, number, moved).items():
             spread[name] += (value - at[name]) ** 2
     units = _units(claim.effect, at, labels)
     return {
@@ -188,7 +188,7 @@ def _interval(value: float, standard_error: float) -> tuple[float, float] | None
     return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
 
 
-def reported_parameters(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
+def report_parameters(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
     """Parameters as the vocabulary defines them: of the first site, or of the largest for effects in `LARGEST`."""
     groups = _groups(whole, number, point)
     claim = whole.claims[number]

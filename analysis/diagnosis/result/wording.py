@@ -15,8 +15,8 @@ from analysis.diagnosis.result.candidate_wording import (
 )
 from analysis.diagnosis.result.ceiling_wording import (
     black_box_sentence,
-    ceiling_sentences,
     confirmation_sentence,
+    describe_ceiling,
     fall_text,
     one_error,
 )
@@ -210,7 +210,7 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
             describe_raised_error(diagnosis.fit.test),
             describe_retuning(moved, found.fitted),
             remainder_sentence(diagnosis, device_of(found)),
-            *ceiling_sentences(found.reached),
+            *describe_ceiling(found.reached),
             black_box_sentence(found.black_box, bool(diagnosis.effects)),
             *candidate_sentences(diagnosis, device_of(found)),
         ]

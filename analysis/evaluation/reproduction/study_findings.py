@@ -71,7 +71,7 @@ def study_findings(analysis: StudyAnalysis) -> FigureFindings:
         _rise(means, 5.0, 15.0, "apparently up, not significant with ten participants", significant=False),
         _rise(means, 15.0, 25.0, "apparently up, not significant", significant=False),
         _rise(means, 5.0, 35.0, "significantly up at 35 Hz (p < 0.05)", significant=True),
-        _censoring_finding(means, analysis),
+        _find_censoring(means, analysis),
         _similar(means),
     ]
     return FigureFindings(
@@ -118,7 +118,7 @@ def _rise(means: _Means, low_hz: float, high_hz: float, published: str, signific
     )
 
 
-def _censoring_finding(means: _Means, analysis: StudyAnalysis) -> Finding | None:
+def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
     if 35.0 not in analysis.table.frequencies_hz:
         return None
     cut, all_of_them = means.cut(35.0), len(analysis.table.subjects)

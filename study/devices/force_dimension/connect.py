@@ -30,7 +30,7 @@ def load_library() -> Library:
     computer = this_computer(os.environ)
     path = find_library(computer)
     if path is None:
-        raise missing_library_error(computer)
+        raise make_missing_library_error(computer)
     return Library(path)
 
 
@@ -94,7 +94,7 @@ def device_error(name: str, error: LibraryError) -> DeviceError:
     )
 
 
-def missing_library_error(computer: Computer) -> DeviceError:
+def make_missing_library_error(computer: Computer) -> DeviceError:
     """Error for a computer on which the vendor's library is not found; it lists the folders that were searched."""
     places = list(dict.fromkeys(str(folder) for folder, _ in library_patterns(computer)))
     return DeviceError(

@@ -60,7 +60,7 @@ def play_equalized(
         unscaled = row.driver is not_equalized
         found[key] = replace(played, response=normalise_gain(played.response)) if unscaled else played
         on_share(number / len(rows))
-    return _sort_rows(found, (*blended.remarks, *remarks, *_clipping_remarks(found)))
+    return _sort_rows(found, (*blended.remarks, *remarks, *_describe_clipping(found)))
 
 
 def make_blending_driver(models: ModelsAtPlace) -> Driver:
@@ -113,7 +113,7 @@ def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRo
     return {"edge_modal": row}, at_edge.remarks
 
 
-def _clipping_remarks(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
+def _describe_clipping(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
     return [
         f"{row.name} ({row.signal}): a cap cut the force off at {row.clipped_ticks} ticks."
         for row in found.values()

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from equalizer.signals.recording import Hold, Recording, Segment
-from equalizer.signals.recording_checks import recording_problems, signals_of
+from equalizer.signals.recording_checks import check_recording, signals_of
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import check_quantity, parse_unit
 from study.store.disk.file_errors import UnusableFileError
@@ -61,7 +61,7 @@ def read_recording(path: Path | str) -> Recording:
     if problems.found or command is None or response is None:
         raise UnusableFileError(path, KIND, tuple(problems.found))
     recording = Recording(device, command, response, position, excitation, time_s, hold, segments, meta, condition)
-    if wrong := recording_problems(recording):
+    if wrong := check_recording(recording):
         raise UnusableFileError(path, KIND, wrong)
     return recording
 
@@ -75,7 +75,7 @@ def write_recording(
 ) -> None:
     """Write a recording. `precision` applies to command, response and excitation; position and time are always
     float64, for micrometres in a large workspace. Raises StudyError; ValueError for an inconsistent recording."""
-    if wrong := recording_problems(recording):
+    if wrong := check_recording(recording):
         raise ValueError(f"this recording cannot be written: {'; '.join(wrong)}")
 
     def fill(file: Any) -> None:

@@ -24,7 +24,7 @@ from study.tui.screens.note_prompt import NotePrompt
 from study.tui.screens.watch_help import GUIDE, HELP
 from study.tui.screens.watch_style import STYLE
 from study.tui.watch.level_history import LevelHistory
-from study.tui.watch.watch_panels import alarm_lines, details, gauges, runs_lines, standing_line, trials_lines
+from study.tui.watch.watch_panels import alarm_lines, describe_standing, details, gauges, runs_lines, trials_lines
 from study.tui.watch.watch_source import WatchSource
 from study.tui.watch.watch_words import staircase_title
 
@@ -183,7 +183,7 @@ class WatchScreen(Screen[None]):
         if view is None:
             return
         self._redraw()
-        self.query_one("#standing", Static).update(standing_line(view))
+        self.query_one("#standing", Static).update(describe_standing(view))
         self.query_one("#levels").border_title = staircase_title(view)
         self.query_one(LevelHistory).show(view.points, view.next_level_n, view.cap_n)
         self.query_one("#details", Static).update(details(view))

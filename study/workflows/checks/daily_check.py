@@ -23,7 +23,7 @@ from study.store.formats.daily_check_file import DailyCheck, read_daily_check, w
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.device_changes import change_findings
-from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
+from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on
 
 if TYPE_CHECKING:
     from analysis.device_change.compare_devices import Change
@@ -249,7 +249,7 @@ def _time_stamp() -> str:
 
 
 def _open_free_device(plan: RecordingPlan) -> Device:
-    return open_device(plan.device, recording_settings(plan), RealClock(), plan.seed)
+    return open_device(plan.device, make_recording_settings(plan), RealClock(), plan.seed)
 
 
 def _as_json(change: "Change") -> dict[str, Any]:

@@ -201,7 +201,7 @@ Two loggers write a table each: `drive_3.csv` with the columns `t,counts,current
 """Beginning of the page."""
 
 
-def importing_markdown() -> str:
+def write_importing_page() -> str:
     """The text of docs/importing.md."""
     parts = [
         _INTRODUCTION,

@@ -12,8 +12,8 @@ from equalizer.linkage.calibration import (
     CalibrationError,
     LinkageCalibration,
     LinkageReading,
+    check_reading,
     difference_problems,
-    reading_problems,
 )
 from equalizer.linkage.grid import STEP_M, arm_azimuths, beside, difference_error, symmetric_grid
 from equalizer.linkage.mirror_lines import asymmetry_words, fill_in, line_asymmetry
@@ -145,7 +145,7 @@ def _read_grid(
             unread.append(position)
         else:
             readings.append(reading)
-            problems += reading_problems(reading)
+            problems += check_reading(reading)
             worst = max(worst, _difference_error(linkage, reading))
         on_progress(number / len(grid))
     if problems:
@@ -173,7 +173,7 @@ def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
     centre = linkage.at(np.zeros(3))
     if centre is None:
         raise CalibrationError(("the centre of the workspace is out of its reach",))
-    problems = tuple(reading_problems(centre)) or tuple(difference_problems(_difference_error(linkage, centre)))
+    problems = tuple(check_reading(centre)) or tuple(difference_problems(_difference_error(linkage, centre)))
     if problems:
         raise CalibrationError(problems)
     return centre.jacobian
@@ -181,7 +181,7 @@ def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
 
 def _difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
     """Difference between the device's Jacobian and finite differences of its own joint angles, relative to the
-    Jacobian. 0 where a neighbour is out of reach, or where a value is no number, which `reading_problems` refuses."""
+    Jacobian. 0 where a neighbour is out of reach, or where a value is no number, which `check_reading` refuses."""
     positions = beside(reading.position_m)
     rows = [angle for position in positions if (angle := linkage.angles_at(position)) is not None]
     angles = np.array(rows)

@@ -9,7 +9,7 @@ from analysis.diagnosis.balance.balances import motions_in_own_band
 from analysis.diagnosis.balance.motion import motion_band_hz, motions_of
 from analysis.diagnosis.confirm.fitting_measures import choose_fitting_measure
 from analysis.diagnosis.confirm.measures_of_balances import BALANCE_LEAVES_LESS, choose_forces_of_balance
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.search_by_simulation import _unseen_by_balance
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -53,7 +53,7 @@ def recorded(recording_of):
 
 
 def test_the_band_of_the_motion_is_that_of_the_driven_one(recorded):
-    records = observed_parts([recorded(FRICTION)], 2)
+    records = observe_parts([recorded(FRICTION)], 2)
     motions = motions_of(records)
     hub_hz, both_hz = motion_band_hz(motions, [0]), motion_band_hz(motions, [0, 1])
     (narrow,) = motions_in_own_band(records, motions)
