@@ -67,6 +67,6 @@ def threshold_words(rule: StaircaseRule) -> ThresholdWords:
     return _psi(rule) if rule.is_bayesian else REVERSALS
 
 
-def capitalised(words: str) -> str:
-    """At the beginning of a sentence."""
+def capitalise_first(words: str) -> str:
+    """The words with a capital first letter."""
     return f"{words[0].upper()}{words[1:]}"

@@ -168,7 +168,7 @@ def _unseen_by_balance(name: str, place: str, driven: bool) -> bool:
 
 def hums_low(found: Explanation) -> bool:
     """A line far below any mains is a harmonic of what drives the device."""
-    placed = found.after.fitted.hypothesis.placed_effects()
+    placed = found.after.fitted.hypothesis.list_placed_effects()
     return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)
 
 

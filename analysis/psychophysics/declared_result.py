@@ -7,7 +7,7 @@ from typing import Literal
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.hierarchy.primary import FAR_ABOVE, PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
-from analysis.threshold_words import capitalised, threshold_words
+from analysis.threshold_words import capitalise_first, threshold_words
 from analysis.wording import conjoin
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule
@@ -32,7 +32,7 @@ class ContrastResult:
     participants: tuple[int, int]
     """At the first and at the second frequency."""
     difference: float | None
-    """In `unit`, as the interval. None, as these and p, where the data do not tell it: `notes` says why."""
+    """In `unit`, as the interval. None, as these and p, where the data do not determine it: `notes` says why."""
     lower: float | None
     upper: float | None
     p: float | None
@@ -81,7 +81,7 @@ def declared_result(
                 comparisons,
                 table,
                 declared.primary == "published",
-                TUKEY.format(means=capitalised(threshold_words(rule).means)),
+                TUKEY.format(means=capitalise_first(threshold_words(rule).means)),
             ),
         ]
         results.sort(key=lambda result: not result.declared)
@@ -124,7 +124,7 @@ def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
 
 
 def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[str, ...]:
-    """What a median above the cap leaves of the interval."""
+    """Notes on the interval of a contrast where a median lies above the cap."""
     above = [median.frequency_hz for median in primary.medians if median.above_cap and median.frequency_hz in pair_hz]
     if len(above) == 2:
         return ("Both medians are above the cap: the size of their difference is not known.",)

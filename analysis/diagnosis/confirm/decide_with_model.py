@@ -53,7 +53,7 @@ def decide_with_model(
     if known_noise and near_noise:
         why_not = "the noise is known here, and what it leaves is more than noise"
         return ResultWithModel(
-            replace(result, unconfirmed=(*result.unconfirmed, *_unconfirmed_candidates(result, why_not))), balances
+            replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, why_not))), balances
         )
     why_not = objection(result, balances)
     if result.found.steps and not why_not:
@@ -63,7 +63,7 @@ def decide_with_model(
         judged = replace(found.judgement, verdict="partly_explained")
         return ResultWithModel(replace(found, judgement=judged, remarks=result.remarks), balances)
     return ResultWithModel(
-        replace(result, unconfirmed=(*result.unconfirmed, *_unconfirmed_candidates(result, why_not))), balances
+        replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, why_not))), balances
     )
 
 
@@ -123,7 +123,7 @@ def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
     return claim.effect.name in names
 
 
-def _unconfirmed_candidates(result: SearchResult, why_not: str) -> tuple[Unconfirmed, ...]:
+def _list_unconfirmed(result: SearchResult, why_not: str) -> tuple[Unconfirmed, ...]:
     """The best candidates of the round in which the search ended, the largest gain first."""
     rounds = [fitted_candidates for fitted_candidates in result.found.rounds if fitted_candidates]
     if not rounds:

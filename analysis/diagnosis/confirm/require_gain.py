@@ -40,7 +40,7 @@ def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
     while found.steps and not _takes_enough(result.context, found):
         found = without_effect(result.context, found, len(found.steps) - 1)
         result = replace(result, found=found, judgement=judge(found), errors=None)
-    names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed_effects()}
+    names = {placed.effect.name for placed in found.after.fitted.hypothesis.list_placed_effects()}
     if repeats or result.judgement.verdict != "explained" or names <= set(CONSTANTS):
         return result
     return replace(result, judgement=replace(result.judgement, verdict="partly_explained"))

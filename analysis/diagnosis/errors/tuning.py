@@ -73,7 +73,7 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
     relative = UNSTATED.modes if tolerance.modes is None else tolerance.modes
     assert relative is not None
     grounded = [
-        _stated_deviation(stated, matrix[:m, :m])
+        _read_stated_deviation(stated, matrix[:m, :m])
         for stated, matrix in (
             (tolerance.mass_kg, split.mass),
             (tolerance.damping_n_s_per_m, split.damping),
@@ -106,7 +106,7 @@ class _Split:
     frequency_hz: FloatArray
 
 
-def _stated_deviation(stated: float | None, grounded: FloatArray) -> float:
+def _read_stated_deviation(stated: float | None, grounded: FloatArray) -> float:
     if stated is not None:
         return stated
     return UNSTATED_SHARE * float(np.abs(np.diagonal(grounded)).max()) or UNSTATED_SHARE

@@ -43,7 +43,7 @@ def repeat_noise(
     varies = np.asarray(moved & ~counted)
     smooth = smooth_over_lines(pooled, _SMOOTHED_LINES)
     smooth *= pooled.mean(axis=0) / np.maximum(smooth.mean(axis=0), _TINY)
-    floor, loud = _no_more_than_rest(recording, samples, smooth, freedom_pooled, np.asarray(varies.any(axis=0)))
+    floor, above_rest = _no_more_than_rest(recording, samples, smooth, freedom_pooled, np.asarray(varies.any(axis=0)))
     whole, rounding = with_rounding(floor, samples)
     segments = tuple(
         SegmentNoise(
@@ -56,7 +56,9 @@ def repeat_noise(
         )
         for k, period in enumerate(periods)
     )
-    return ChannelNoise(np.sqrt(whole.mean(axis=0)), whole, freedom_pooled, rounding, segments, tuple(loud.tolist()))
+    return ChannelNoise(
+        np.sqrt(whole.mean(axis=0)), whole, freedom_pooled, rounding, segments, tuple(above_rest.tolist())
+    )
 
 
 def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -70,7 +72,8 @@ def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray,
 
 
 def quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
-    """Which rows do not differ significantly from the quietest of their column. Both (rows, channels)."""
+    """Mask (rows, channels) of the variances that do not differ significantly from the smallest of their column (F
+    test). variance, freedom: (rows, channels), variances and their degrees of freedom."""
     least = np.argmin(variance, axis=0)
     columns = np.arange(variance.shape[1])
     bound = _largest_ratio(freedom, freedom[least, columns])
@@ -110,14 +113,14 @@ def _no_more_than_rest(
     hiss = fast_noise_at_rest(recording, samples)
     if hiss is None or not varied.any():
         return density, none
-    quiet = quietest(hiss.variance, hiss.freedom)
-    weights = np.where(quiet, hiss.freedom, 0.0)
+    at_rest = quietest(hiss.variance, hiss.freedom)
+    weights = np.where(at_rest, hiss.freedom, 0.0)
     rest = np.sum(weights * hiss.variance, axis=0) / weights.sum(axis=0)
-    loud = varied & (density.mean(axis=0) > _largest_ratio(freedom, weights.sum(axis=0)) * rest) & (rest > 0)
+    above_rest = varied & (density.mean(axis=0) > _largest_ratio(freedom, weights.sum(axis=0)) * rest) & (rest > 0)
     # The smaller of both at each line would be too small on average: of two estimates of one noise, the lower.
     of_line = np.maximum(freedom * _SMOOTHED_LINES / len(density), 1.0)
     lower = rest > _largest_ratio(weights.sum(axis=0), of_line) * density
-    return np.where(loud & ~lower, rest, density), np.asarray(loud, dtype=np.bool_)
+    return np.where(above_rest & ~lower, rest, density), np.asarray(above_rest, dtype=np.bool_)
 
 
 def _largest_ratio(freedom: FloatArray, others: FloatArray) -> FloatArray:

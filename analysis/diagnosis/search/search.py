@@ -82,8 +82,8 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
 
 @dataclass(frozen=True, slots=True)
 class Beyond:
-    """What is tried where the catalogue leaves a mismatch. Each returns the search with what it names in place of the
-    catalogue's effects, or with candidates, or unchanged."""
+    """Searches beyond the catalogue, for a mismatch that it leaves. Each returns the result with its own effects named
+    in place of the catalogue's, with candidates, or unchanged."""
 
     before_pairs: Callable[[SearchResult], SearchResult] = lambda seen: seen
     """Before a second effect is looked for: names only what is a shorter description than two effects."""
@@ -148,7 +148,7 @@ def _keep_early(early: SearchResult, result: SearchResult) -> SearchResult:
 
 
 def _guarded(add: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
-    """With the search unchanged where it crashes."""
+    """The search `add`, which returns its argument unchanged where it crashes."""
     return lambda seen: seen.context.guard.part(LAW_BEYOND, "its search", lambda: add(seen), seen)
 
 
@@ -189,7 +189,8 @@ def _search_with_pairs(
 def _find_beyond(
     first: SearchResult, opened: SearchResult, adds: bool, beyond: Callable[[SearchResult], SearchResult]
 ) -> SearchResult:
-    """What is found beyond the catalogue without the opened samples, or with them."""
+    """Result of the search beyond the catalogue: first without the opened held-out samples, then, where that names
+    nothing, with them."""
     tried = beyond(first)
     if tried.judgement.named:
         return tried

@@ -176,8 +176,8 @@ def sensitivity_at(
     plain = sensitivity(context.measure, context.tuning, deviations, kept, context.map_)
     if not with_forces or kept is hypothesis:
         return plain
-    felt = sensitive_parameters(context.measure, context.tuning, plain, hypothesis)
-    return sensitivity(context.measure, context.tuning, deviations, hypothesis, context.map_, (plain.columns, felt))
+    sensed = sensitive_parameters(context.measure, context.tuning, plain, hypothesis)
+    return sensitivity(context.measure, context.tuning, deviations, hypothesis, context.map_, (plain.columns, sensed))
 
 
 def _worth_fitting(base: Fitted, screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
@@ -198,14 +198,13 @@ def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedH
     return [entry for _, entry in sorted(ranked, key=lambda pair: pair[0])]
 
 
-# Selects the model's parameters that matter for a force at an axis: those that change how that axis moves.
 def sensitive_parameters(
     measure: ErrorMeasure, tuning: Tuning, plain: Sensitivity, hypothesis: Hypothesis
 ) -> list[int]:
     """Parameters whose sensitivity changes with the hypothesis's forces: those that move the axes at which these act.
     plain: sensitivity without motion-dependent forces."""
     forces = [
-        effect for effect in hypothesis.placed_effects() if isinstance(effect.effect.acts, (AxisForce, JointForce))
+        effect for effect in hypothesis.list_placed_effects() if isinstance(effect.effect.acts, (AxisForce, JointForce))
     ]
     model = tuning.tune(np.zeros(len(tuning.names)))
     if not forces or any(isinstance(force.effect.acts, JointForce) for force in forces):
@@ -213,11 +212,11 @@ def sensitive_parameters(
     reached = np.abs(model.output @ np.linalg.solve(model.mass, model.input))
     sites = {site for force in forces for site in force.sites}
     strength = _strengths(measure, plain.columns, model.outputs)
-    felt = np.zeros(len(tuning.names), dtype=bool)
+    sensed = np.zeros(len(tuning.names), dtype=bool)
     for site in sites:
         in_channel = strength[:, int(np.argmax(reached[:, site]))]
-        felt |= in_channel > SENSED_SHARE * in_channel.max(initial=0.0)
-    return np.flatnonzero(felt).tolist()
+        sensed |= in_channel > SENSED_SHARE * in_channel.max(initial=0.0)
+    return np.flatnonzero(sensed).tolist()
 
 
 def _strengths(measure: ErrorMeasure, columns: FloatArray, outputs: int) -> FloatArray:

@@ -11,7 +11,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.baselines import (
     Inverse,
     acceleration_matching,
-    identified_inverse,
+    make_identified_inverse,
     no_equalization,
     raw_estimate,
     rigid_body,
@@ -41,7 +41,7 @@ def baseline_inverses(
         acceleration_matching(model, frequency_hz),
         rigid_body(model, frequency_hz),
         raw_estimate(measured, frequency_hz),
-        identified_inverse(model, frequency_hz),
+        make_identified_inverse(model, frequency_hz),
     )
 
 

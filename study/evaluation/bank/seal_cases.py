@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from study.errors import StudyError
-from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_label, seal
 from study.evaluation.challenge.draw_bank import Draw, case_of, draw
@@ -28,7 +28,8 @@ from study.workflows.worker_processes import worker_processes
 
 
 def truths(case: Case) -> list[dict[str, Any]]:
-    """One entry per concealed effect; empty where the model lacks nothing."""
+    """Concealed effects of a case as JSON values: name, place, axis, parameters; empty where the model lacks
+    nothing."""
     return [
         {
             "effect": truth.effect,
@@ -70,7 +71,7 @@ def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Cal
     missing = [each for each in drawn if not folder.label(each.number).exists()]
     done = len(drawn) - len(missing)
     on_sealed(done)
-    with finished_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
+    with finish_begun_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
         for finished in as_completed([pool.submit(seal_one, folder, each) for each in missing]):
             finished.result()
             done += 1
@@ -79,7 +80,8 @@ def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Cal
 
 
 def seal_one(folder: ProofFolder, each: Draw) -> None:
-    """Write one case; a missing label means an unfinished case."""
+    """Write one case: recording, model and settings for the diagnosis, then the label, without which the case counts as
+    unfinished."""
     place = begin_case(folder)
     case = case_of(each, place.name)
     write_recording(place / RECORDING, case.recording, precision="float32")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from analysis.evaluation.laws.law_error import FreshMotion
-from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import seal
 from study.evaluation.bank.seal_cases import PROCESSOR_S, SALT_BYTES, BankPlan
@@ -32,7 +32,7 @@ def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Call
     left = [each for each in drawn if not folder.label(each.number).exists()]
     done = len(drawn) - len(left)
     on_sealed(done)
-    with finished_cases(folder), worker_processes(workers if len(left) > 1 else 1) as pool:
+    with finish_begun_cases(folder), worker_processes(workers if len(left) > 1 else 1) as pool:
         for finished in as_completed([pool.submit(_seal_law, folder, each) for each in left]):
             finished.result()
             done += 1

@@ -240,7 +240,7 @@ def test_a_stop_is_played_on_whichever_side_of_zero_it_stands(position_m, side, 
     judged = SimpleNamespace(formula=None, law=SimpleNamespace(effect="end_stop", channel=0), values=values)
     assert can_be_played(0, judged)
 
-    (placed,) = hypothesis_of_judged(0, judged, None).placed_effects()
+    (placed,) = hypothesis_of_judged(0, judged, None).list_placed_effects()
     at, numbers = np.zeros(LENGTH), placed.effect.acts.pack(None, 0, placed.values)
     at[X] = at[X_FREE] = pushing_at_m
     assert placed.effect.acts.law(numbers, np.zeros(1), at) == pytest.approx(-800.0 * (pushing_at_m - position_m))
