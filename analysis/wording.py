@@ -30,7 +30,7 @@ def number(value: float | None, digits: int = 2) -> str:
     return NONE if value is None else typeset(f"{value:.{digits}f}")
 
 
-def signed_number(value: float, digits: int = 2) -> str:
+def format_signed(value: float, digits: int = 2) -> str:
     """The number with its sign, also where it is positive."""
     return typeset(f"{value:+.{digits}f}")
 
@@ -91,7 +91,7 @@ def end_sentence(sentence: str) -> str:
     return sentence if sentence.endswith((".", "!", "?")) or not sentence else f"{sentence}."
 
 
-def untimed_text(text: str) -> str:
+def write_without_time(text: str) -> str:
     """A sentence or label of a recording without known time, in samples instead of seconds and hertz."""
     for unit, instead in _UNTIMED:
         text = re.sub(unit, instead, text)

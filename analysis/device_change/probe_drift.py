@@ -177,10 +177,10 @@ def _first_friction(
         here = np.take_along_axis(shape, axes[None, :, None], axis=2)[..., 0][:count] / answer[:count]
         misfit, levels_n = 0.0, np.zeros(3)
         for axis in range(3):
-            mine = axes == axis
-            weight = 1 / np.abs(stiff[:, mine])
-            x = _real((here - here.mean(axis=0))[:, mine] * weight)
-            y = _real((stiff - stiff.mean(axis=0))[:, mine] * weight)
+            of_axis = axes == axis
+            weight = 1 / np.abs(stiff[:, of_axis])
+            x = _real((here - here.mean(axis=0))[:, of_axis] * weight)
+            y = _real((stiff - stiff.mean(axis=0))[:, of_axis] * weight)
             levels_n[axis] = max(0.0, float(x @ y / max(float(x @ x), 1e-300)))
             misfit += float(np.sum((y - levels_n[axis] * x) ** 2))
         if misfit < best[0]:

@@ -20,12 +20,11 @@ from analysis.diagnosis.result.assemble_findings import assemble_findings
 from analysis.diagnosis.result.candidates import balance_errors, beside_given, linear_remarks, with_balances
 from analysis.diagnosis.result.curves.state_maps import StateMaps, state_maps
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.unconfirmed import unconfirmed_candidates
+from analysis.diagnosis.result.unconfirmed import list_unconfirmed_candidates
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
-from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.search_by_simulation import SearchOutcome, search_by_simulation, search_context_of
 from analysis.diagnosis.settings import FAULT_BEYOND
 from analysis.diagnosis.types import Mapper, Progress
@@ -99,9 +98,9 @@ def _diagnose_by_model(
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     if settings.fitted and balances:
         # Imported here, as above: only a model that was fitted has balances.
-        from analysis.diagnosis.confirm.measures_of_balances import choose_plain_forces
+        from analysis.diagnosis.confirm.measures_of_balances import choose_forces_of_balance
 
-        fitting = choose_plain_forces(recordings, fitting, balances)
+        fitting = choose_forces_of_balance(recordings, fitting, balances)
     if settings.fitted and is_too_short_to_name(recordings):
         unsearched = SearchOutcome(_evaluate_given_model(recordings, fitting, settings, map_), CleanFloor())
         return _assemble(recordings, settings, fitting, unsearched, balances)
@@ -218,7 +217,7 @@ def _assemble(
     found = result.found if result.judgement.named else replace(result.found, after=result.found.retuned)
     whole = assemble_findings(replace(result, found=found), fitting.chosen.floors, names, outcome.floor)
     channels = recordings[0].command.channels
-    found_too = unconfirmed_candidates(result.unconfirmed, whole.black_box, recordings[0], fitting.model)
+    found_too = list_unconfirmed_candidates(result.unconfirmed, whole.black_box, recordings[0], fitting.model)
     if settings.fitted:
         diagnosis = with_balances(whole.diagnosis, balances, channels, found_too)
     else:

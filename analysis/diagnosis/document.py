@@ -62,7 +62,7 @@ class Mismatch:
     p_value: Annotated[float, Field(ge=0, le=1)]
 
     @model_validator(mode="after")
-    def _rising_band(self) -> Self:
+    def _require_rising_band(self) -> Self:
         if not 0 <= self.band_hz[0] < self.band_hz[1]:
             raise ValueError(f"band_hz must rise from 0 or more, not {list(self.band_hz)}")
         return self
@@ -77,7 +77,7 @@ class Estimate:
     ci95: tuple[float, float] | None = None
 
     @model_validator(mode="after")
-    def _rising_interval(self) -> Self:
+    def _require_rising_interval(self) -> Self:
         if self.ci95 is not None and self.ci95[0] > self.ci95[1]:
             raise ValueError(f"ci95 must rise, not {list(self.ci95)}")
         return self

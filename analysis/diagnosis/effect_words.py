@@ -16,7 +16,7 @@ class EffectWords:
     """Words for an effect of the vocabulary: its noun, and how its parameters are printed."""
 
     noun: str
-    numbers: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, str] = field(default_factory=dict)
     """Words by parameter, in the order of printing; other parameters are not printed. Empty text: the main
     parameter."""
     shares: tuple[str, ...] = ()
@@ -235,7 +235,7 @@ _SEATS: Mapping[str, tuple[str, str]] = {
 def parameters_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
     """ "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest"."""
     known = _find_words(effect)
-    named = dict(known.numbers) if known else {}
+    named = dict(known.parameters) if known else {}
     if not named:
         main = (EFFECTS_BY_NAME[effect].main.name,) if effect in EFFECTS_BY_NAME else tuple(parameters)[:1]
         named = dict.fromkeys(main, _BARE)

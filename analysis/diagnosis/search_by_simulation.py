@@ -11,9 +11,9 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.search import HUM, Beyond, SearchResult, search_effects
+from analysis.diagnosis.search.search import HUM, Beyond, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import SearchResult, judge
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import Effect
@@ -168,7 +168,7 @@ def _unseen_by_balance(name: str, place: str, driven: bool) -> bool:
 
 def hums_low(found: Explanation) -> bool:
     """A line far below any mains is a harmonic of what drives the device."""
-    placed = found.after.fitted.hypothesis.placed_effects()
+    placed = found.after.fitted.hypothesis.list_placed_effects()
     return any(each.effect.name == HUM and each.values["frequency"] < LOWEST_MAINS_HZ for each in placed)
 
 

@@ -38,7 +38,7 @@ LEVELS_TO_HOLD_ONE_BACK = 3  # principle: a level to choose by lies between two 
 CHOOSE_SHARE = 0.25  # of the fitting time, from its end, where no level can be kept back to choose by
 TEST_SHARE = 0.25  # of the time, or of each part's motion, from its end, where no segment has a role
 AT_REST = 0.02  # of the range of a response, within which it rests where a part of the recording ends
-LONGEST_TAIL = 0.05  # of a part, which may rest at its end without another split; where it rests is told from it
+LONGEST_TAIL = 0.05  # of a part, which may rest at its end without another split; where it rests is judged by it
 STILL_SHARE = 0.01  # of the mean square of the motion that is fitted, below which what is held out tests nothing
 
 # Which error measure suits (`error_measure_rule`, `closed_loop`). By hand.
@@ -54,6 +54,7 @@ UNKNOWN_NOISE_SHARE = 1e-3  # of the signal, taken for noise where a recording c
 
 # How far the model's own parameters may move (`tuning`, `output_error`, `rigid_model`). By hand.
 RETUNING_BOUND = 4.0  # standard deviations of the calibration
+WIDER_RETUNING_BOUND = 12.0  # the same where what is found within the former leaves a mismatch (`search_wider`)
 UNSTATED_SHARE = 0.1  # one standard deviation of what has no stated tolerance, of the largest at any axis
 UNSTATED_MODES = 0.02  # the same of a mode's frequency
 RIGID_SHARE, RIGID_MASS_SHARE = 0.25, 0.05  # the same of damping and stiffness, and of mass, of a fitted rigid model
@@ -65,11 +66,11 @@ RETUNING_NAMED, RETUNING_DOUBTED = 1.0, 3.0  # standard deviations from which a 
 FALSE_DISCOVERY_RATE = 0.01  # of cells and states, by the test of Benjamini and Bogomolov (2014)
 DISTORTION_P = 0.001  # p-value below which a kind of distortion is there
 STEADY_DB = 1.5  # change of distortion per doubling of the level that is neither rising nor falling
-ENTRY_ANGLE = 0.1  # mean sine between two entries' directions below which they cannot be told apart
+ENTRY_ANGLE = 0.1  # mean sine between two entries' directions below which they are not distinguished
 ENTRY_LOUD = 3.0  # times its noise, in power, that a residual must be on a line to count
 ENTRY_PER_DIMENSION = 0.25  # score that each further direction must gain; else model errors on other axes are forces
-ENTRY_SENSOR_PENALTY = log(2.0)  # score against an entry that the comparison of position and response speaks against
-ENTRY_LEAST_LINES = 40  # loud lines below which nothing is said of where a mismatch enters
+ENTRY_SENSOR_PENALTY = log(2.0)  # score against an entry that contradicts the comparison of position and response
+ENTRY_LEAST_LINES = 40  # lines above the noise below which nothing is said of where a mismatch enters
 ENTRY_AS_GOOD_P = 0.05  # p-value above which the next entry would explain it about as well
 SENSOR_SHOWN = 4.0  # times the position's noise, in power, that the response's residual must bring there to be missed
 SENSOR_LOUD = 10.0  # times its own noise, in power, that the response's residual must be on such a line
@@ -132,8 +133,8 @@ NAMED_GAIN = 1.6  # or gains this, four fifths of the error power: noise may be 
 EXPLAINED_BY_CHANCE = 2.5  # error over chance, where a statistic is compared; principle: no law of a contact is exact
 CONFIRMED_SHARE = 0.3  # of the mismatch, in logarithms, that must fall on held-out samples,
 HELD_OUT_TOO_SMALL = 0.05  # unless it is smaller there than this
-# on held-out samples, and over that on all others: all but the loudest of the held-out ones, or half, are opened
-HELD_OUT_ALONE_ERROR, HELD_OUT_ALONE_TIMES = 1.25, 1.5
+# times the noise, and the error on all others, that held-out samples must show to be opened in part (`open_milder`)
+HELD_OUT_ALONE_ERROR = 1.25
 LOUDER = 1.05  # times the largest command elsewhere, from which on a stretch is louder
 
 # Faults that a recording shows by itself (`model_free_faults`). By hand.
@@ -187,14 +188,14 @@ LAW_PLACEBO = 0.5  # of what chance leaves of a shuffled force, that a law may l
 LAW_SAME = 0.05  # of what a law predicts: laws that are no further apart are one, written in two ways
 PITCHES_SEEN = 2.0  # of a periodic force, below which another curve may do as well; principle: a period is seen twice
 LAW_COMMAND_TAKEN = 0.5  # of its axis's command, beyond which a force is the balance's trivial solution; by hand
-LAW_NEAR = 0.03  # of a whole or half exponent, that is then no number to be told
+LAW_NEAR = 0.03  # of a whole or half exponent, that is then rounded to it
 
-# How a law of the command is told from sums of laws of the motion (`balance/actuator`). By hand.
+# How a law of the command is distinguished from sums of laws of the motion (`balance/actuator`). By hand.
 SUMS_BESIDE_COMMAND_LAW = 4  # best sums of laws of the motion that are tried beside a law of the command
 # share of the error that the best sum of laws of the motion leaves which a law of the command must take: what lag
 # and delay leave is smaller
 COMMAND_LAW_LEAVES = 0.5
-COMMAND_RIVAL_LEAVES_MORE = 0.3  # share of its own error by which a rival must leave more to be told from it
+COMMAND_RIVAL_LEAVES_MORE = 0.3  # share of its own error by which a rival must leave more to be ruled out
 
 # share of the samples, at least, in which an actuator of a tried limited rate reaches its command. By hand: one that
 # never does goes by the command's sign alone
@@ -234,7 +235,7 @@ LINEAR_PART_ROUNDS = 2  # searches at most, each with the linear part that the o
 # share of what all laws together take of the error that the named ones must reach, so that they are its main part
 NAMED_OF_CEILING = 0.5
 LAW_OF_CEILING = 0.05  # share of the same that each named law must take
-RIVAL_STAYS_BEHIND = 0.15  # share of a law's gain by which a rival in its place must stay behind to be told from it
+RIVAL_STAYS_BEHIND = 0.15  # share of a law's gain by which a rival in its place must stay behind to be ruled out
 # share of the force's rms that a law must take: laboratory recordings are not calibrated better
 LAW_OF_SIGNAL = 0.02
 SECOND_OF_FAMILY = 2 / 3  # share of what is left that a second law of one family must take
@@ -325,7 +326,7 @@ FAULT_BEYOND = 5.0
 FAULT_STEADY = 0.4
 # share of what sets the sets apart that a name must explain: with less, the main part is another's
 FAULT_MAIN_PART = 0.4
-FAULT_RIVAL_BEHIND = 0.1  # share of a fault's gain by which a rival must stay behind to be told from it,
+FAULT_RIVAL_BEHIND = 0.1  # share of a fault's gain by which a rival must stay behind to be ruled out,
 # or of what the fault leaves: where a gain is large, a tenth of it is many times that. By hand
 FAULT_RIVAL_WORSE = 0.25
 LARGEST_FAULT_CLASS = 4  # faults of a class at most; a larger class says nothing

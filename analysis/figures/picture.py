@@ -9,7 +9,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.wording import untimed_text
+from analysis.wording import write_without_time
 
 
 def inline_svg(figure: Figure, name: str, title: str, description: str = "") -> str:
@@ -87,6 +87,6 @@ def count_in_samples(picture: Picture) -> Picture:
     drawing."""
     for text in picture.figure.findobj(Text):
         if isinstance(text, Text):
-            text.set_text(untimed_text(text.get_text()))
-    caption, alternative = untimed_text(picture.caption), untimed_text(picture.alternative)
+            text.set_text(write_without_time(text.get_text()))
+    caption, alternative = write_without_time(picture.caption), write_without_time(picture.alternative)
     return replace(picture, caption=caption, alternative=alternative)

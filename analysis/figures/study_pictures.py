@@ -29,7 +29,7 @@ def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult
         pictures += _units_pictures(analysis)
     pictures += _curve_pictures(analysis)
     if any(trial.counts and trial.delivered_mps2 for trial in analysis.trials):
-        pictures.append(_delivered_picture(analysis))
+        pictures.append(_draw_delivered(analysis))
     pictures += _staircase_pictures(analysis)
     if ellipsoids:
         pictures.append(ellipsoid_picture(ellipsoids))
@@ -154,7 +154,7 @@ def _file_name(subject: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "-", subject).strip("-")
 
 
-def _delivered_picture(analysis: StudyAnalysis) -> Picture:
+def _draw_delivered(analysis: StudyAnalysis) -> Picture:
     return Picture(
         name="delivered",
         title="Delivered acceleration against commanded level",

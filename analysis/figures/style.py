@@ -17,9 +17,9 @@ MARKERS = ("o", "s", "D", "P", "X", "p", "h", "d", "*", "8")
 CUT_MARKER = "$\\uparrow$"
 """An arrow above the participant's own marker: the cap cut into this threshold."""
 _STEPS = ((1.5, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)), (3.0, (1.0, 2.0, 5.0)), (4.0, (1.0, 3.0)), (np.inf, (1.0,)))
-"""Tick multiples by the number of decades of an axis."""
+"""Largest number of decades of an axis, and the multiples of powers of ten that are its ticks. By hand."""
 
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 PAGE_IN = 7.2
 """Width of a figure over both columns of a paper (183 mm); text of 8 to 10 points needs no scaling there."""
@@ -45,13 +45,13 @@ def participant_colour(number: int) -> str:
 
 
 def participant_marker(number: int) -> str:
-    """Participants differ in their markers, too, so that a print in grey tells them apart."""
+    """Marker of a participant by number from 0, so that participants differ in a grey print, too."""
     return MARKERS[number % len(MARKERS)]
 
 
 def panel_grid(panels: int, height_in: float, sharex: bool = False) -> tuple[Figure, list[Axes]]:
-    """A page-wide figure of up to three columns, and its axes, at least one more than panels, for the legend; those
-    without a panel are off. height_in: of a line of panels."""
+    """A page-wide figure of up to three columns, and its axes row by row: at least one more than there are panels, for
+    the legend; axes without a panel are switched off. height_in: height of a row of panels (inches)."""
     columns = min(3, panels + 1)
     lines = -(-(panels + 1) // columns)
     figure = new_figure(PAGE_IN, height_in * lines)
@@ -73,14 +73,15 @@ def name_panel_axes(places: list[Axes], panels: int, below: str, left: str) -> N
 
 
 def newton_ticks(axis: Axis, lowest_n: float, highest_n: float) -> None:
-    """Round levels on a logarithmic axis, written as people say them. Call after the scale is set."""
+    """Ticks at 1, 2 and 5 times powers of ten (N) on a logarithmic axis, as decimals. Call after the scale is set."""
     levels = [level for level in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 3.0) if lowest_n <= level <= highest_n]
     axis.set_ticks(levels, labels=[f"{level:g}" for level in levels])
     axis.set_ticks([], minor=True)
 
 
 def ratio_ticks(axis: Axis, low: float, high: float) -> None:
-    """Round multiples on a logarithmic axis, as many as there is room for. Call after the scale is set."""
+    """Ticks from low to high on a logarithmic axis, at the multiples of powers of ten of `_STEPS`: fewer of them the
+    more decades there are. Call after the scale is set."""
     decades = np.log10(high / low)
     steps = next(each for most, each in _STEPS if decades <= most)
     powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
@@ -91,8 +92,9 @@ def ratio_ticks(axis: Axis, low: float, high: float) -> None:
 
 
 def power_of_ten(value: float) -> str:
-    """0.001 as "10⁻³": written out, because formulas take matplotlib a second."""
-    return "10" + f"{np.log10(value):.0f}".translate(_RAISED) if value > 0 else ""
+    """A power of ten as text, such as "10⁻³" for 0.001; other values are rounded to one, and 0 or less is empty.
+    Without matplotlib's own formulas, whose first use takes a second."""
+    return "10" + f"{np.log10(value):.0f}".translate(_SUPERSCRIPTS) if value > 0 else ""
 
 
 def draw_no_data_note(figure: Figure, sentence: str) -> Figure:

@@ -66,7 +66,7 @@ def count_clipped_samples(samples: FloatArray) -> int:
     if at_top.sum() < LEAST_SAMPLES or at_top.sum() < _CROWDED * next_below / max(1.0, width / max(step, width)):
         return 0
     runs = runs_of(at_top)
-    beyond = [_extrapolated_rise(filled, start, stop) for start, stop in runs]
+    beyond = [_extrapolate_rise(filled, start, stop) for start, stop in runs]
     needed = max(_STEPS * step, 1e-6 * float(np.ptp(known)))
     counted = [stop - start for (start, stop), over in zip(runs, beyond, strict=True) if over > needed]
     # A periodic signal comes back to its peak again and again, by the same way: that is one run.
@@ -81,7 +81,7 @@ def _run_signature(samples: FloatArray, run: tuple[int, int], step: float) -> tu
     return (stop - start, *beside)
 
 
-def _extrapolated_rise(samples: FloatArray, start: int, stop: int) -> float:
+def _extrapolate_rise(samples: FloatArray, start: int, stop: int) -> float:
     """Extrapolated rise of the signal above a flat run; 0 at the ends of a recording."""
     back = max(1, (stop - start) // 8)  # a rounded signal stands still between its steps, so not by two samples alone
     if start - 1 < 2 * back or stop + back >= len(samples):

@@ -31,7 +31,7 @@ def check_clock(recording: Recording, stretches: Sequence[Stretch]) -> tuple[Che
             ),
         )
     if recording.time_s is None:
-        checks = (*_resampling_checks(recording), *_rate_checks(recording.sample_rate_hz))
+        checks = (*_check_resampling(recording), *_rate_checks(recording.sample_rate_hz))
         return checks or (Check(CLOCK, "fine", _clock_source(recording)),)
     found = tuple(check for start, stop in stretches for check in _stamp_checks(recording, start, stop))
     return found or (Check(CLOCK, "fine", "All stamps are in their places."),)
@@ -56,7 +56,7 @@ def _clock_source(recording: Recording) -> str:
     return f"There are no time stamps; {recording.sample_rate_hz:g} Hz is taken as stated."
 
 
-def _resampling_checks(recording: Recording) -> tuple[Check, ...]:
+def _check_resampling(recording: Recording) -> tuple[Check, ...]:
     """Checks from an import's notes about uneven stamps."""
     origin = recording.meta.get("import")
     notes = origin.get("notes", ()) if isinstance(origin, dict) else ()

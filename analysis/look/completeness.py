@@ -20,11 +20,11 @@ _FIRST_FEW = 1000
 
 def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[Check, ...]:
     """A check of each channel with missing samples; a single "fine" check where no channel has any."""
-    found = tuple(_missing_check(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all())
+    found = tuple(_check_missing(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all())
     return fine_if_none(MISSING, found, "No sample is missing in any channel.")
 
 
-def _missing_check(channel: Channel, rate_hz: float) -> Check:
+def _check_missing(channel: Channel, rate_hz: float) -> Check:
     lost = ~np.isfinite(channel.samples)
     count, first = int(lost.sum()), int(np.argmax(lost))
     longest = max(stop - start for start, stop in runs_of(lost))

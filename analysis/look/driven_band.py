@@ -68,7 +68,8 @@ def _is_moving(channel: Channel) -> bool:
 def response_coherences(
     spectra: CrossSpectra, channels: Sequence[Channel], bands: Sequence[DrivenBand]
 ) -> tuple[ResponseCoherence, ...]:
-    """Empty where nothing is driven, or too few windows were averaged to tell."""
+    """Coherence of each response with the driven commands, by band. Empty where nothing is driven, or too few windows
+    were averaged."""
     inputs = [k for k, c in enumerate(channels) if c.role == "command" and c.name in {band.command for band in bands}]
     if not inputs or spectra.windows < 2 * len(inputs) + 2:
         return ()
@@ -143,8 +144,8 @@ def silent_segments(recording: Recording) -> tuple[str, ...]:
 
 
 def coherence_checks(coherences: Sequence[ResponseCoherence], recording: Recording) -> tuple[Check, ...]:
-    """Checks of the coherences. For single steps, slow signals and controllers, windows tell little: a notice at
-    most."""
+    """Checks of the coherences. For single steps, slow signals and controllers, windows are no good estimate: a notice
+    at most."""
     kinds = {segment.kind for segment in recording.segments}
     broad = bool(kinds) and kinds <= _BROAD and recording.excitation is None
     return tuple(_coherence_check(coherence, broad) for coherence in coherences)

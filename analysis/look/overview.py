@@ -25,7 +25,7 @@ from analysis.look.kinematics import KinematicPair, find_kinematic_pairs, kinema
 from analysis.look.levels import SegmentLevel, level_checks, segment_levels
 from analysis.look.plausibility import check_offsets, check_units
 from analysis.look.repeats import Repeats, find_repeats, repeat_checks
-from analysis.wording import untimed_text
+from analysis.wording import write_without_time
 from equalizer.signals.recording import Recording
 from equalizer.signals.summary import Summarised, Summary
 
@@ -160,7 +160,7 @@ def _count_in_samples(check: Check) -> Check:
     """A check of a recording without known time, in samples; the check of the clock stays as it is."""
     if check.name == CLOCK:
         return check
-    return replace(check, seen=untimed_text(check.seen), do=untimed_text(check.do))
+    return replace(check, seen=write_without_time(check.seen), do=write_without_time(check.do))
 
 
 def _summarise_channel(channel: Channel) -> ChannelSummary:

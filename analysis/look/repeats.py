@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.found_segments import designed_command, find_period
-from analysis.diagnosis.noise.periods import period_samples, settled_periods
+from analysis.diagnosis.data.found_segments import find_designed_command, find_period
+from analysis.diagnosis.noise.periods import find_settled_periods, period_samples
 from analysis.look.channels import Stretch, rms
 from analysis.look.check import Check
 from analysis.wording import conjoin, typeset
@@ -55,7 +55,7 @@ def find_repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
     marked = [(segment.start, segment.stop) for segment in recording.segments]
     for places in (marked, list(stretches)):  # a segment that was split for a test may hold less than two periods
         start, stop = max(places, key=lambda place: place[1] - place[0], default=(0, 0))
-        if period := find_period(designed_command(recording).samples[start:stop]):
+        if period := find_period(find_designed_command(recording).samples[start:stop]):
             as_said = replace(recording, segments=(Segment(start, stop, "multisine", 0.0, period),))
             return Repeats(period, (start, stop), _noise_between_repeats(as_said, declared=False))
     return Repeats(0, (0, 0), ())
@@ -63,7 +63,7 @@ def find_repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
 
 def _noise_between_repeats(recording: Recording, *, declared: bool) -> tuple[RepeatNoise, ...]:
     found = []
-    for periods in settled_periods(recording):
+    for periods in find_settled_periods(recording):
         if periods.count < 2:
             continue
         by_period = period_samples(recording.response.samples, periods)
@@ -102,16 +102,16 @@ def _noise_checks(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[C
     channels = recording.response.channels
     shares = np.array([each.share for each in noise])
     sentence = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
-    loud = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
+    noisy = [name for k, name in enumerate(channels) if shares[:, k].min() > LOUD]
     text = f"Between repeats (up to {max(each.periods for each in noise)}) remain at least {sentence}, rms."
-    do = f"{conjoin(loud)} hardly repeat: average more periods, or drive more." if loud else ""
-    return (Check(REPEATS, "notice" if loud else "fine", text, do),)
+    do = f"{conjoin(noisy)} hardly repeat: average more periods, or drive more." if noisy else ""
+    return (Check(REPEATS, "notice" if noisy else "fine", text, do),)
 
 
 def _period_checks(recording: Recording) -> list[Check | None]:
     """Checks of the segments' declared periods, by the command's difference from period to period."""
     return [
-        _check_period(designed_command(recording).samples[segment.start : segment.stop], segment, number)
+        _check_period(find_designed_command(recording).samples[segment.start : segment.stop], segment, number)
         for number, segment in enumerate(recording.segments, start=1)
         if segment.period and segment.stop - segment.start >= 2 * segment.period
     ]

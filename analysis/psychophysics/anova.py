@@ -50,7 +50,8 @@ class OneWayAnova:
 
 
 def one_way_anova(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
-    """One-way ANOVA over named groups. None and NaN are gaps; groups may differ in size."""
+    """One-way ANOVA over named groups of values, all in one unit. None and NaN are gaps and left out; groups may differ
+    in size. Never raises: what the data do not determine is None, with the reason in `notes`."""
     samples = {name: _finite_values(values) for name, values in groups.items()}
     summaries = tuple(_summarise_group(name, sample) for name, sample in samples.items())
     gaps = sum(len(values) for values in groups.values()) - sum(len(sample) for sample in samples.values())
@@ -68,6 +69,7 @@ def one_way_anova(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
 
 
 def _compute_anova(filled: list[FloatArray], summaries: tuple[GroupSummary, ...], notes: list[str]) -> OneWayAnova:
+    """The equations of the module. filled: at least two groups, not empty, with more values than groups."""
     everything = np.concatenate(filled)
     grand = everything.mean()
     ss_between = float(sum(len(sample) * (sample.mean() - grand) ** 2 for sample in filled))
@@ -95,7 +97,8 @@ def _compute_anova(filled: list[FloatArray], summaries: tuple[GroupSummary, ...]
 
 
 def is_rounding(sum_of_squares: float, values: FloatArray) -> bool:
-    """Whether a sum of squares is nothing but rounding of the values it came from."""
+    """Whether a sum of squares of differences is nothing but rounding of the values (n,) that it was computed from: at
+    most n (64 eps max |value|)², eps the relative spacing of 64-bit floats. 64 by hand."""
     scale = float(np.abs(values).max())
     return bool(sum_of_squares <= values.size * (64 * np.finfo(float).eps * scale) ** 2)
 

@@ -37,7 +37,7 @@ def response_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> R
     false_alarms = [not right for shown, right in zip(directions_shown, correct, strict=True) if shown == 2]
     if not hits or not false_alarms:
         return None
-    z_hit, z_false_alarm = _corrected_z(hits), _corrected_z(false_alarms)
+    z_hit, z_false_alarm = _correct_z(hits), _correct_z(false_alarms)
     return ResponseBias(d_prime=z_hit - z_false_alarm, criterion=-0.5 * (z_hit + z_false_alarm))
 
 
@@ -49,6 +49,6 @@ def criterion_variance(right: int, first: float, second: float) -> float:
     return by_answer * (1.0 / first + 1.0 / second) / 4.0
 
 
-def _corrected_z(answers: Sequence[bool]) -> float:
+def _correct_z(answers: Sequence[bool]) -> float:
     """z of the rate with half an answer added to either side, which keeps rates of 0 and 1 finite."""
     return NormalDist().inv_cdf((sum(answers) + 0.5) / (len(answers) + 1.0))

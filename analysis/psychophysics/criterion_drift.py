@@ -43,8 +43,9 @@ _Run = tuple[Sequence[int], Sequence[bool]]
 
 
 def criterion_drifts(sessions: Sequence[Sequence[_Run]]) -> tuple[CriterionDrift | None, ...]:
-    """For each session the weighted regression of its runs' criteria on the trials before their middles. sessions: of
-    one study, each with its runs in their order. None with fewer than `FEWEST_RUNS` that have both directions.
+    """Drift of the response criterion by session: weighted regression of the criteria of its runs on the number of
+    trials before their middles. sessions: of one study, each with its runs in their order. None with fewer than
+    `FEWEST_RUNS` that have both directions.
     """
     lines = [_line(runs) for runs in sessions]
     fits = [_fit(points) for points in lines if points is not None]
@@ -55,7 +56,7 @@ def criterion_drifts(sessions: Sequence[Sequence[_Run]]) -> tuple[CriterionDrift
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """Of a straight line by weighted least squares."""
+    """Straight line fitted by weighted least squares."""
 
     slope: float
     z: float
@@ -105,7 +106,7 @@ def _p(z: float, dispersion: float, freedom: int) -> float:
 
 
 def _criterion_variance(directions_shown: Sequence[int], correct: Sequence[bool]) -> float:
-    """Of two z scores at the run's share of right answers, as without a bias: at the rates of the run itself, runs of a
-    strong bias would count for little."""
+    """Variance of a run's criterion, computed at its share of right answers for both directions, as without a bias: at
+    the rates of the run itself, runs with a strong bias would count for little."""
     first = sum(shown == 1 for shown in directions_shown)
     return criterion_variance(sum(correct), first, len(directions_shown) - first)

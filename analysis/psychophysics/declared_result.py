@@ -32,7 +32,7 @@ class ContrastResult:
     participants: tuple[int, int]
     """At the first and at the second frequency."""
     difference: float | None
-    """In `unit`, as the interval. None, as these and p, where the data do not tell it: `notes` says why."""
+    """In `unit`, as the interval. None, as these and p, where the data do not determine it: `notes` says why."""
     lower: float | None
     upper: float | None
     p: float | None
@@ -124,7 +124,7 @@ def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
 
 
 def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[str, ...]:
-    """What a median above the cap leaves of the interval."""
+    """Notes on the interval of a contrast where a median lies above the cap."""
     above = [median.frequency_hz for median in primary.medians if median.above_cap and median.frequency_hz in pair_hz]
     if len(above) == 2:
         return ("Both medians are above the cap: the size of their difference is not known.",)

@@ -65,7 +65,8 @@ def _felt(detection: ThresholdTable, subject: str, frequency_hz: float) -> tuple
 
 
 def directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[BelowDetection, ...]:
-    """Both tables in newtons. Thresholds of direction that the cap cut are left out."""
+    """Participants and frequencies whose direction threshold lies below their detection threshold. Both tables in
+    newtons; direction thresholds that the cap cut are left out."""
     felt = {
         (subject, frequency_hz): value
         for subject, row in zip(detection.subjects, detection.values, strict=True)

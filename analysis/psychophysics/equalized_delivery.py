@@ -64,7 +64,7 @@ def _summarise_delivery(frequency_hz: float, trials: list[Trial], first_deg: flo
     """first_deg: angle of direction 1, where it is known."""
     sides: list[float | None] = []
     for number in (1, 2):
-        ratios = [_delivery_ratio(trial) for trial in trials if _played_direction(trial, first_deg) == number]
+        ratios = [_delivery_ratio(trial) for trial in trials if _find_played_direction(trial, first_deg) == number]
         sides.append(median(ratios) if ratios else None)
     return Delivery(
         frequency_hz,
@@ -80,7 +80,7 @@ def _larger_angle_deg(trials: Sequence[Trial]) -> float | None:
     return max((angle for angle in angles if angle is not None), default=None) if len(angles - {None}) == 2 else None
 
 
-def _played_direction(trial: Trial, first_deg: float | None) -> int:
+def _find_played_direction(trial: Trial, first_deg: float | None) -> int:
     """The protocol's direction that was played; its number on the screen where the angles are not known."""
     if first_deg is None or trial.angle_deg is None:
         return trial.direction_shown

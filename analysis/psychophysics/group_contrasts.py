@@ -38,7 +38,7 @@ class Contrast:
     upper_db: float
     p: float
     p_holm: float
-    """Holm's, over all contrasts of the family, also those that are not told: together wrong in at most 5 %."""
+    """Holm's, over all contrasts of the family, also those that are not reported: together wrong in at most 5 %."""
     effect_size: float | None
     """Mean over standard deviation of the differences (Cohen's d_z); None where the differences are not known."""
     p_equivalence: float | None
@@ -61,7 +61,7 @@ class MeanErrors:
 
 def mean_errors(values: FloatArray, known: NDArray[np.bool_]) -> MeanErrors:
     """Errors of the means of pseudo-values. values: (n, m), one from each person; known: (n, m), whether it rests on
-    answers of their own there, or only on what theirs at other frequencies tell.
+    answers of their own there, or only on their answers at other frequencies.
 
     Where all are known this is the textbook's error, with n - 1 degrees of freedom. Else both groups of people add
     their part, each with its own degrees of freedom (F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110-114): the

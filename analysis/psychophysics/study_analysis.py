@@ -233,7 +233,7 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
         "mean_contrasts_db": [asdict(contrast) for contrast in analysis.mean_contrasts],
         "tobit_contrasts_db": [asdict(contrast) for contrast in analysis.tobit],
         "declared": asdict(analysis.protocol.analysis),
-        "declared_result": _declared_document(analysis.declared_result),
+        "declared_result": _write_declared_result(analysis.declared_result),
         "compared": analysis.compared,
         "cues": [asdict(cue) for cue in analysis.cues],
         "cue_gaps": [asdict(gap) for gap in analysis.cue_gaps],
@@ -241,7 +241,7 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
     }
 
 
-def _declared_document(result: DeclaredResult) -> dict[str, Any]:
+def _write_declared_result(result: DeclaredResult) -> dict[str, Any]:
     """What was left out as a number: its sentences name sessions of people who withdrew."""
     document = asdict(result)
     document["left_out_count"] = len(document.pop("left_out"))
@@ -261,7 +261,7 @@ def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
         "The published analysis is one-way: it takes every threshold as that of another person, so that differences "
         f"between people count as error: {f_text(anova.df_between, anova.df_within, anova.f)}, {p_text(anova.p)}. "
         "Every participant took every frequency; the analysis within participants takes those differences out "
-        f"({_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
+        f"({_write_removed_percent(within)} of the spread within frequencies, {within.participants} participants): "
         f"{f_text(within.df_conditions, within.df_error, within.f)}, Greenhouse-Geisser epsilon "
         f"{within.epsilon:.2f}, {p_text(within.p)}. "
         + ("Both agree at the 5 % level. " if agree else "They disagree at the 5 % level. ")
@@ -269,6 +269,6 @@ def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
     )
 
 
-def _removed_percent(within: RepeatedMeasures) -> str:
+def _write_removed_percent(within: RepeatedMeasures) -> str:
     between, error = within.ss_participants or 0.0, within.ss_error or 0.0
     return f"{100 * between / (between + error):.0f} %"

@@ -12,7 +12,7 @@ from analysis.psychophysics.detection import directions_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.threshold_words import threshold_words
-from analysis.wording import conjoin, signed_number
+from analysis.wording import conjoin, format_signed
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
@@ -27,8 +27,8 @@ BIAS_ERRORS = 2.58
 observer without bias exceeds `STRONG_BIAS`. 1 % by chance; in 45 trials or more `STRONG_BIAS` asks more."""
 DRIFT_LEVEL, LEFT_OUT_LEVEL = 0.02, 0.2
 """Levels of the test of a drifting criterion, by session: of all runs, and of those without any one of them. Together
-they named 3 of 1000 honest simulated sessions, and 438 of 1000 whose criterion moved by 0.3 in 100 trials
-(tests/references/drift_flag.py)."""
+they named 3 of 1000 simulated sessions with a constant criterion, and 438 of 1000 whose criterion moved by 0.3 in 100
+trials (tests/references/drift_flag.py)."""
 MANY_LAPSES = 0.1
 """Lapse rate on catch trials that is worth a look; the published staircase is meant for attentive people."""
 FELT_BY_ALL_HZ = 15.0
@@ -45,18 +45,18 @@ def study_warnings(
     if not rows:
         return ("No test trial is there, so there is no threshold of direction.",)
     candidates = (
-        _stopped_warning(rows, protocol.staircase),
+        _warn_of_stopped(rows, protocol.staircase),
         _incomplete_warning(rows, protocol.staircase),
-        _missing_warning(table),
-        _censored_warning(table, protocol.staircase),
+        _warn_of_missing(table),
+        _warn_of_censored(table, protocol.staircase),
         _few_participants_warning(table),
         _unequal_sizes_warning(table),
         _chance_warning(rows),
         _bias_warning(rows),
         _drift_warning(trials),
-        _spoiled_warning(trials),
-        _flagged_warning(trials),
-        _unmeasured_warning(trials),
+        _warn_of_spoiled(trials),
+        _warn_of_flagged(trials),
+        _warn_of_unmeasured(trials),
         *table.notes,
     )
     return tuple(sentence for sentence in candidates if sentence)
@@ -75,7 +75,7 @@ def side_warnings(
         if broken
         else "",
         f"{_count_text(cut, 'detection threshold')} cut by the cap: {conjoin(cut)}." if cut else "",
-        _undetected_warning(detection),
+        _warn_of_undetected(detection),
         _below_detection_warning(table, felt),
         *felt.notes,
     )
@@ -91,7 +91,7 @@ def _incomplete_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     return f"{_count_text(cut, 'run')} not complete and without a threshold: {conjoin(cut)}." if cut else ""
 
 
-def _stopped_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
+def _warn_of_stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     stopped = [
         f"{_run_text(row)} ({_progress(row, rule)}, {row.trials_at_cap} trials at the cap)"
         for row in rows
@@ -113,12 +113,12 @@ def _progress(row: Threshold, rule: StaircaseRule) -> str:
     return f"{row.reversals} of {rule.reversals} reversals"
 
 
-def _missing_warning(table: ThresholdTable) -> str:
+def _warn_of_missing(table: ThresholdTable) -> str:
     gaps = [f"{subject} at {frequency:g} Hz" for subject, frequency in table.gaps()]
     return f"No threshold for {conjoin(gaps)}." if gaps else ""
 
 
-def _censored_warning(table: ThresholdTable, rule: StaircaseRule) -> str:
+def _warn_of_censored(table: ThresholdTable, rule: StaircaseRule) -> str:
     cut = [
         f"{subject} at {frequency:g} Hz"
         for subject, row in zip(table.subjects, table.censored, strict=True)
@@ -175,7 +175,7 @@ def _is_above_chance(percent_correct: float, trials: int) -> bool:
 
 def _bias_warning(rows: Sequence[Threshold]) -> str:
     leaning = [
-        f"{_run_text(row)} (criterion {signed_number(row.criterion)})"
+        f"{_run_text(row)} (criterion {format_signed(row.criterion)})"
         for row in rows
         if row.criterion is not None and _leans(row, row.criterion)
     ]
@@ -197,7 +197,7 @@ def _drift_warning(trials: Iterable[Trial]) -> str:
             sessions.setdefault((trial.subject, trial.session), {}).setdefault(trial.run, []).append(trial)
     drifts = criterion_drifts([[_answers(runs[run]) for run in sorted(runs)] for runs in sessions.values()])
     drifting = [
-        f"{subject} ({session}, criterion {signed_number(drift.per_100_trials)} per 100 trials)"
+        f"{subject} ({session}, criterion {format_signed(drift.per_100_trials)} per 100 trials)"
         for (subject, session), drift in zip(sessions, drifts, strict=True)
         if drift is not None and drift.p < DRIFT_LEVEL and drift.p_without_a_run < LEFT_OUT_LEVEL
     ]
@@ -213,19 +213,19 @@ def _answers(run: Sequence[Trial]) -> tuple[list[int], list[bool]]:
     return [trial.direction_shown for trial in run], [bool(trial.correct) for trial in run]
 
 
-def _spoiled_warning(trials: Iterable[Trial]) -> str:
+def _warn_of_spoiled(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.SPOILED for trial in trials)
     return f"{count} spoiled presentation{'s' if count != 1 else ''}, played again; the answers do not count." * bool(
         count
     )
 
 
-def _flagged_warning(trials: Iterable[Trial]) -> str:
+def _warn_of_flagged(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.FLAGGED for trial in trials)
     return f"{count} trial{'s' if count != 1 else ''} flagged: counted, but the stimulus is worth a look." * bool(count)
 
 
-def _unmeasured_warning(trials: Iterable[Trial]) -> str:
+def _warn_of_unmeasured(trials: Iterable[Trial]) -> str:
     count = sum(trial.counts and trial.delivered_mps2 is None for trial in trials)
     if not count:
         return ""
@@ -252,7 +252,7 @@ def _lapse_warning(catches: Sequence[CatchTally]) -> str:
     )
 
 
-def _undetected_warning(detection: Sequence[Threshold]) -> str:
+def _warn_of_undetected(detection: Sequence[Threshold]) -> str:
     guessed = _runs_at_chance(detection)
     return f"Detection not shown to be better than chance: {conjoin(guessed)}." if guessed else ""
 

@@ -8,6 +8,8 @@ from typing import Literal
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 
 Quantity = Literal["threshold_n", "threshold_db", "threshold_mps2", "threshold_mm", "above_detection_db"]
+"""A threshold as force (N, or dB re 1 N), acceleration (m/s²), displacement (mm), or dB above the detection
+threshold."""
 
 
 @dataclass(frozen=True, slots=True)

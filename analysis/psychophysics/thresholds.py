@@ -157,7 +157,8 @@ def _from_posterior(run: Run, rule: StaircaseRule) -> _Found:
 
 
 def _at_level(trial: Trial, measured: float | None, level_n: float) -> float | None:
-    """What was measured, as it would be at another level: in proportion. So are levels that were roved."""
+    """A measured value of a trial scaled in proportion to another level (N), also where the level was roved; None where
+    nothing was measured."""
     return None if measured is None else measured * level_n / trial.level_n
 
 

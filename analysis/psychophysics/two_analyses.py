@@ -9,7 +9,7 @@ from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
 from analysis.threshold_words import threshold_words
-from analysis.wording import capitalise, conjoin, p_text, signed_number
+from analysis.wording import capitalise, conjoin, format_signed, p_text
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 
@@ -85,8 +85,8 @@ def comparison_text(
 
 
 def coverage_notes(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
-    """What was measured of these (names of `coverage_words.NAMES`), where the cap cut into the data; nothing of another
-    staircase than the one that was simulated."""
+    """Measured coverage of the intervals of these analyses (names of `coverage_words.NAMES`), as sentences, where the
+    cap cut into the data; empty for a staircase other than the simulated one."""
     if not table.coverage or rule != SIMULATED_RULE:
         return ()
     return tuple(filter(None, (coverage_sentence(MEASURED, name) for name in analyses)))
@@ -103,8 +103,8 @@ def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: Stair
     if not any(mean for _, mean in pairs):
         return f"{capitalise(named)} tell no difference to {against} yet that could be held against the model's."
     apart = [
-        f"at {contrast.frequency_hz:g} Hz {signed_number(contrast.difference_db, 1)} dB against "
-        f"{signed_number(mean.difference_db, 1)} dB"
+        f"at {contrast.frequency_hz:g} Hz {format_signed(contrast.difference_db, 1)} dB against "
+        f"{format_signed(mean.difference_db, 1)} dB"
         for contrast, mean in pairs
         if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB
     ]

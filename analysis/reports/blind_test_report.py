@@ -8,7 +8,7 @@ from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.evaluation.blind_test.score import Score
 from analysis.evaluation.blind_test.share import Figure
-from analysis.evaluation.blind_test.wording import answer_text, concealed_text, figure_text, strength_text
+from analysis.evaluation.blind_test.wording import answer_text, describe_concealed, figure_text, strength_text
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page
 
@@ -84,8 +84,8 @@ def _follow_up_sections(found: Sequence[FollowUp]) -> tuple[Section, ...]:
     rows = tuple(
         (
             str(each.number), each.effect, ", ".join(each.returned), each.proposed or "nothing would tell",
-            _returned_text(each.proposed, each.after_proposed), each.drawn or "-",
-            _returned_text(each.drawn, each.after_drawn),
+            _describe_returned(each.proposed, each.after_proposed), each.drawn or "-",
+            _describe_returned(each.drawn, each.after_drawn),
         )
         for each in found
     )  # fmt: skip
@@ -95,7 +95,7 @@ def _follow_up_sections(found: Sequence[FollowUp]) -> tuple[Section, ...]:
     return (Section("The next experiment", tables=(table,)),)
 
 
-def _returned_text(recorded: str, returned: Sequence[str]) -> str:
+def _describe_returned(recorded: str, returned: Sequence[str]) -> str:
     return (", ".join(returned) or "no name") if recorded else "-"
 
 
@@ -111,7 +111,7 @@ def _fact_points(facts: BlindTestFacts) -> tuple[str, ...]:
 def _miss_table(misses: Sequence[Outcome]) -> Table:
     rows = tuple(
         (
-            str(miss.number), f"{miss.kind}, {miss.bank}", concealed_text(miss), strength_text(miss) or "-",
+            str(miss.number), f"{miss.kind}, {miss.bank}", describe_concealed(miss), strength_text(miss) or "-",
             answer_text(miss), f"{miss.left('retuned'):.2f}", f"{miss.left('after'):.2f}",
         )
         for miss in misses

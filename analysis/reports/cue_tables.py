@@ -8,7 +8,7 @@ from analysis.psychophysics.cues.cue_findings import CueFinding, cue_warnings, g
 from analysis.psychophysics.cues.delivered_cues import CueGap
 from analysis.reports.page import Section, Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, conjoin, number, p_value, signed_number
+from analysis.wording import NONE, conjoin, format_signed, number, p_value
 from protocols.definition.staircase_rule import StaircaseRule
 
 _MEANING = (
@@ -19,7 +19,7 @@ _MEANING = (
 
 
 def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:
-    """Empty where no trial was measured."""
+    """Section on cues other than the direction; empty where no trial was measured."""
     if not found:
         return []
     sentences = (*(cue_warnings(found) or (_nothing(found),)), *filter(None, [gap_text(gaps)]))
@@ -28,14 +28,14 @@ def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap], rule: Stair
 
 
 def _nothing(found: Sequence[CueFinding]) -> str:
-    blind = [f"{each.cue.value} at {each.frequency_hz:g} Hz" for each in found if not each.answers.tells]
+    unclear = [f"{each.cue.value} at {each.frequency_hz:g} Hz" for each in found if not each.answers.is_conclusive]
     return (
         "No difference that was measured is one that a usual judge notices, and no answers are shown to follow what "
         "was delivered."
         + (
-            f" Too little varied within a direction to tell whether answers would have followed: {conjoin(blind)}. "
+            f" Too little varied within a direction to tell whether answers would have followed: {conjoin(unclear)}. "
             "A roved level (rove_db of [stimulus]) would tell for intensity."
-            if blind
+            if unclear
             else ""
         )
     )
@@ -50,8 +50,8 @@ def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
         ),
         rows=tuple(
             (
-                each.cue.value, f"{each.frequency_hz:g} Hz", signed_number(each.difference_db),
-                signed_number(each.largest_db), number(each.spread_db),
+                each.cue.value, f"{each.frequency_hz:g} Hz", format_signed(each.difference_db),
+                format_signed(each.largest_db), number(each.spread_db),
                 *(number(ability) for ability in each.abilities), number(each.observed_d_prime),
                 f"{len(each.noticed_by)} of {len(each.people)}",
             )
@@ -75,7 +75,7 @@ def _answer_table(found: Sequence[CueFinding]) -> Table:
         rows=tuple(
             (
                 each.cue.value, f"{each.frequency_hz:g} Hz", str(each.answers.trials),
-                number(each.answers.residual_sd_db, 3), *_slope_texts(each.answers), p_value(each.p_holm), _says(each),
+                number(each.answers.residual_sd_db, 3), *_slope_texts(each.answers), p_value(each.p_holm), _judge(each),
             )
             for each in found
         ),
@@ -92,10 +92,10 @@ def _answer_table(found: Sequence[CueFinding]) -> Table:
 def _slope_texts(answers: AnswersOnDelivery) -> tuple[str, str]:
     if answers.slope is None or answers.lower is None or answers.upper is None:
         return NONE, NONE
-    return signed_number(answers.slope), f"{signed_number(answers.lower)} to {signed_number(answers.upper)}"
+    return format_signed(answers.slope), f"{format_signed(answers.lower)} to {format_signed(answers.upper)}"
 
 
-def _says(finding: CueFinding) -> str:
+def _judge(finding: CueFinding) -> str:
     if finding.followed:
         return "followed"
-    return "not followed" if finding.answers.tells else "cannot tell"
+    return "not followed" if finding.answers.is_conclusive else "cannot tell"

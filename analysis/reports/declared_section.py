@@ -2,28 +2,28 @@
 
 from analysis.psychophysics.declared_result import ContrastResult, DeclaredResult
 from analysis.reports.page import Section, Table
-from analysis.wording import NONE, p_text, p_value, signed_number
+from analysis.wording import NONE, format_signed, p_text, p_value
 
 NAMES = {"hierarchical": "hierarchical model of all answers", "published": "published one-way analysis"}
 
 
-def declared_section(declaration: str, result: DeclaredResult) -> Section:
+def make_declared_section(declaration: str, result: DeclaredResult) -> Section:
     """The section on the declared result. declaration: what was declared and what was not, in words. Where nothing was,
     the section is this alone."""
     heading = "The declared result"
-    if not _anything_declared(result):
+    if not _is_anything_declared(result):
         return Section(heading, paragraphs=(declaration,))
     tables = (_contrast_table(result),) if result.results else ()
     words = [_sentence(row, result) for row in result.results if row.declared]
     return Section(heading, paragraphs=(declaration, *words), tables=(*tables, _sample_table(result)))
 
 
-def declared_words(result: DeclaredResult) -> tuple[str, ...]:
+def describe_declared(result: DeclaredResult) -> tuple[str, ...]:
     """The declared contrast, in a sentence for each analysis, the declared one first; empty without a contrast."""
     return tuple(_sentence(row, result) for row in result.results)
 
 
-def _anything_declared(result: DeclaredResult) -> bool:
+def _is_anything_declared(result: DeclaredResult) -> bool:
     return result.primary != "undeclared" or bool(
         result.contrast_hz or result.participants_declared or result.exclusions
     )
@@ -37,7 +37,7 @@ def _sentence(row: ContrastResult, result: DeclaredResult) -> str:
         return f"{opening} not known. {' '.join(row.notes)}"
     digits, percent = _digits(row), f"{100 * result.confidence:g} %"
     return (
-        f"{opening} {signed_number(row.difference, digits)} {row.unit} "
+        f"{opening} {format_signed(row.difference, digits)} {row.unit} "
         f"({percent} interval {_interval(row)} {row.unit}, {p_text(row.p)}). {' '.join(row.notes)}"
     ).strip()
 
@@ -48,7 +48,7 @@ def _contrast_table(result: DeclaredResult) -> Table:
     for row in result.results:
         role = " (declared)" if row.declared else ""
         n, m = row.participants
-        size = NONE if row.difference is None else f"{signed_number(row.difference, _digits(row))} {row.unit}"
+        size = NONE if row.difference is None else f"{format_signed(row.difference, _digits(row))} {row.unit}"
         interval = NONE if row.difference is None else f"{_interval(row)} {row.unit}"
         people = str(n) if n == m else f"{n} and {m}"
         rows.append((f"{NAMES[row.analysis]}{role}", people, size, interval, p_value(row.p)))
@@ -81,7 +81,7 @@ def _sample_table(result: DeclaredResult) -> Table:
 
 
 def _interval(row: ContrastResult) -> str:
-    ends = [NONE if end is None else signed_number(end, _digits(row)) for end in (row.lower, row.upper)]
+    ends = [NONE if end is None else format_signed(end, _digits(row)) for end in (row.lower, row.upper)]
     return " to ".join(ends)
 
 

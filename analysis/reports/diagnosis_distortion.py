@@ -79,10 +79,10 @@ def _distortion_table(found: Findings) -> Table | None:
                 output,
                 input_,
                 f"{level:g}",
-                _share_of_signal(noise.get((output, quantity)), next(iter(mine.values())).signal_rms),
-                *(_cell_text(mine.get(kind)) for kind in kinds),
+                _share_of_signal(noise.get((output, quantity)), next(iter(of_level.values())).signal_rms),
+                *(_cell_text(of_level.get(kind)) for kind in kinds),
             )
-            for (output, quantity, input_, level), mine in rows.items()
+            for (output, quantity, input_, level), of_level in rows.items()
         ),
         (
             "Root-mean-square over the driven band. <: below the detection limit, which is stated. "

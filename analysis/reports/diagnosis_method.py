@@ -68,9 +68,10 @@ def _noise_paragraphs(found: Findings) -> tuple[str, ...]:
 def _choice_paragraphs(found: Findings) -> tuple[str, ...]:
     if not found.diagnosis.mismatch:
         return ()
+    bound = RETUNING_BOUND if found.tuning is None else found.tuning.bound
     return (
         "First the model's own parameters were re-tuned, each held by the stated standard deviation of its calibration "
-        f"and moved by at most {RETUNING_BOUND:g} of them. Then every effect of the catalogue was tried wherever it "
+        f"and moved by at most {bound:g} of them. Then every effect of the catalogue was tried wherever it "
         "could be, with starting values from what was still unexplained; the likeliest were fitted together with the "
         "model's parameters, and the best was kept where it earned its place on data that it was not fitted to. The "
         f"same was done for a further effect, at most three. A share of {100 * MODEL_FLOOR:g} % of each channel's "

@@ -7,12 +7,12 @@ from analysis.diagnosis.localisation.localisation_words import localisation_sent
 from analysis.diagnosis.result.ceiling_wording import (
     black_box_beats,
     black_box_sentence,
-    ceiling_sentences,
     confirmation_sentence,
+    describe_ceiling,
 )
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.plausibility import implausible_sentences
-from analysis.diagnosis.result.retuned_parameters import doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.retuned_parameters import describe_retuning, doubtful_sentences
 from analysis.diagnosis.result.wording import (
     answer_of,
     device_of,
@@ -35,8 +35,8 @@ from analysis.reports.diagnosis_tables import (
     error_table,
     mismatch_table,
     parameter_table,
-    retuned_table,
     rival_table,
+    tabulate_retuned,
 )
 from analysis.reports.page import Page, Section, Table, render_page
 from analysis.wording import capitalise
@@ -103,7 +103,7 @@ def _candidate_sections(found: Findings) -> list[Section]:
 
 def _black_box_sections(found: Findings) -> list[Section]:
     text = black_box_sentence(found.black_box, bool(found.diagnosis.effects))
-    paragraphs = tuple(filter(None, (*ceiling_sentences(found.reached), text)))
+    paragraphs = tuple(filter(None, (*describe_ceiling(found.reached), text)))
     return [Section("A black box beside it", paragraphs=paragraphs)] if paragraphs else []
 
 
@@ -140,9 +140,11 @@ def _effect_section(found: Findings, number: int, pictures: Sequence[Picture]) -
 
 def _signature_pictures(found: Findings, effect: NamedEffect, pictures: Sequence[Picture]) -> tuple[Picture, ...]:
     """Signatures of the effect: only those at its own axis where it has one there."""
-    mine = [number for number, signature in enumerate(found.signatures, start=1) if signature.effect == effect.effect]
-    there = [number for number in mine if found.signatures[number - 1].axis == effect.axis]
-    names = {f"signature-{number}" for number in (there or mine)}
+    of_effect = [
+        number for number, signature in enumerate(found.signatures, start=1) if signature.effect == effect.effect
+    ]
+    there = [number for number in of_effect if found.signatures[number - 1].axis == effect.axis]
+    names = {f"signature-{number}" for number in (there or of_effect)}
     return tuple(picture for picture in pictures if picture.name in names)
 
 
@@ -177,8 +179,8 @@ _UNMOVED = {
 
 def _parameter_section(found: Findings) -> Section:
     moved = final_moved_parameters(found)
-    text = retuned_sentence(moved, found.fitted) or _UNMOVED[found.fitted]
-    table = retuned_table(found)
+    text = describe_retuning(moved, found.fitted) or _UNMOVED[found.fitted]
+    table = tabulate_retuned(found)
     return Section(
         "The model's own parameters",
         paragraphs=(text,),

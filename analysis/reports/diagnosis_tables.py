@@ -11,7 +11,7 @@ from analysis.diagnosis.result.retuned_parameters import all_parameters
 from analysis.diagnosis.result.wording import device_of
 from analysis.diagnosis.unit_wording import error_text, probability_text, share_text, value_text
 from analysis.reports.page import Table
-from analysis.wording import NONE, capitalise, end_sentence, p_value, signed_number
+from analysis.wording import NONE, capitalise, end_sentence, format_signed, p_value
 
 _STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With what was found"))
 _MOST_PLACES = 12
@@ -49,7 +49,7 @@ def rival_table(effect: NamedEffect) -> Table:
 
 
 def candidate_table(found: Findings) -> Table | None:
-    """What was not confirmed, the best first; None where there is nothing."""
+    """Table of unconfirmed candidates, the best first; None without any."""
     device = device_of(found)
     rows = tuple(
         (
@@ -128,14 +128,14 @@ def mismatch_table(caption: str, places: Sequence[Mismatch], is_timed: bool = Tr
     return Table(caption, header, rows, notes, folded=True)
 
 
-def retuned_table(found: Findings) -> Table | None:
-    """All of them, folded."""
+def tabulate_retuned(found: Findings) -> Table | None:
+    """Table of all re-tuned parameters, folded on the page; None where nothing was re-tuned."""
     if found.tuning is None:
         return None
     alone = all_parameters(found.tuning, found.explanation.retuned.fitted.deviations)
     final = all_parameters(found.tuning, found.explanation.after.fitted.deviations)
     rows = tuple(
-        (before.name, before.size, signed_number(before.deviations), after.size, signed_number(after.deviations))
+        (before.name, before.size, format_signed(before.deviations), after.size, format_signed(after.deviations))
         for before, after in zip(alone, final, strict=True)
     )
     header = ("Number", "Re-tuned", "Standard deviations", "With what was found", "Standard deviations")

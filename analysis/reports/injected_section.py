@@ -14,7 +14,7 @@ from analysis.evaluation.blind_test.share import Figure
 from analysis.reports.page import Section, Table
 
 
-def injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
+def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
     """Section with rates of right answers, tallies by kind and by recording, and all misses."""
     rates = Table(
         "How often it was right",

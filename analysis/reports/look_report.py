@@ -11,7 +11,7 @@ from analysis.figures.picture import Picture
 from analysis.look.check import Check
 from analysis.look.overview import Overview
 from analysis.reports.page import Page, Section, Table, render_page
-from analysis.wording import typeset, untimed_text
+from analysis.wording import typeset, write_without_time
 
 
 def render_look_report(
@@ -51,7 +51,7 @@ def brief(found: Overview) -> str:
         f"{len(found.channels)} channels, {len(recording.segments)} segments; checks: {counts['wrong']} wrong, "
         f"{counts['notice']} to notice, {counts['fine']} fine."
     )
-    return text if recording.is_timed else untimed_text(text)
+    return text if recording.is_timed else write_without_time(text)
 
 
 def _sections(overview: Overview, pictures: Sequence[Picture], found: Sequence[Overview]) -> tuple[Section, ...]:

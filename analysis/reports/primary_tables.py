@@ -13,7 +13,7 @@ from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.two_analyses import coverage_notes
 from analysis.reports.page import Section, Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, conjoin, number, p_text, p_value, signed_number
+from analysis.wording import NONE, conjoin, format_signed, number, p_text, p_value
 
 AT_BOUND = 0.01
 """Of the logarithm of a spread."""
@@ -94,7 +94,7 @@ def _overall(primary: PrimaryAnalysis) -> str:
         f"{number(primary.slope)} ({primary.family.value}), lapse rate {number(100 * primary.lapse, 1)} %, response "
         f"bias {number(primary.criterion_sd)} (standard deviation, in units of d')."
         + ("" if primary.converged else " The search ended before it had settled: do not use these numbers.")
-        + undetermined_words(primary)
+        + describe_undetermined(primary)
         + far_above_words(primary)
     )
 
@@ -107,7 +107,7 @@ def far_above_words(primary: PrimaryAnalysis) -> str:
     return f" At {names} the medians lie at more than twice the cap: nothing is known of the differences between these."
 
 
-def undetermined_words(primary: PrimaryAnalysis) -> str:
+def describe_undetermined(primary: PrimaryAnalysis) -> str:
     """A sentence with a space before it where a spread between people ended at the bound of its search; else nothing.
     It happens with few people, whose answers hold a slope of 2 and one of 20 nearly equally probable."""
     found = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
@@ -177,8 +177,8 @@ def _contrasts(
             (
                 f"{c.frequency_hz:g} − {c.against_hz:g} Hz{' *' * (c.frequency_hz in above)}",
                 str(c.participants),
-                signed_number(c.difference_db, 1),
-                f"{signed_number(c.lower_db, 1)} to {signed_number(c.upper_db, 1)}",
+                format_signed(c.difference_db, 1),
+                f"{format_signed(c.lower_db, 1)} to {format_signed(c.upper_db, 1)}",
                 p_value(c.p),
                 p_value(c.p_holm),
                 number(c.effect_size),
@@ -233,7 +233,7 @@ def _persons(primary: PrimaryAnalysis) -> Table:
                     for value, above in zip(person.thresholds_n, person.above_cap, strict=True)
                 ),
                 number(person.slope),
-                signed_number(person.criterion),
+                format_signed(person.criterion),
             )
             for person in primary.persons
         ),
@@ -247,7 +247,7 @@ def _goodness(primary: PrimaryAnalysis) -> Table:
         caption="Predicted and observed shares of right answers",
         header=("Trials", "Predicted", "Observed", "z"),
         rows=tuple(
-            (str(b.trials), f"{100 * b.predicted:.1f} %", f"{100 * b.observed:.1f} %", signed_number(b.z, 1))
+            (str(b.trials), f"{100 * b.predicted:.1f} %", f"{100 * b.observed:.1f} %", format_signed(b.z, 1))
             for b in primary.goodness.bins
         ),
         notes=(

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.diagnosis.real_answer.real_answer import OwnNumber, PairOutcome, RealAnswer
+from analysis.diagnosis.real_answer.real_answer import OwnParameter, PairOutcome, RealAnswer
 from analysis.diagnosis.unit_wording import error_text, value_text
 from analysis.evaluation.blind_test.injected import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import error_rows
 from analysis.figures.picture import Picture
-from analysis.reports.injected_section import injected_section
+from analysis.reports.injected_section import make_injected_section
 from analysis.reports.page import Page, Section, Table, render_page
 from analysis.wording import typeset
 
@@ -46,7 +46,7 @@ def render_real_report(
         )
     sections += [_section(answer, pictures.get((answer.folder, answer.recording))) for answer in answers]
     if injected:
-        sections.append(injected_section(injected))
+        sections.append(make_injected_section(injected))
     named = sum(bool(answer.effects) for answer in answers)
     return render_page(
         Page(
@@ -101,7 +101,7 @@ def _section(real_answer: RealAnswer, picture: Picture | None) -> Section:
     points = (
         *real_answer.where,
         *real_answer.named,
-        *(number_sentence(number) for number in real_answer.numbers),
+        *(parameter_sentence(number) for number in real_answer.numbers),
         *_pair_points(real_answer.pair),
     )
     further = tuple(_further_sentence(*test) for test in _further_tests(real_answer))
@@ -140,8 +140,8 @@ def _tables(real_answer: RealAnswer) -> tuple[Table, ...]:
     return (Table("Root-mean-square errors, stretch by stretch", header, rows),)
 
 
-def number_sentence(number: OwnNumber) -> str:
-    """Sentence that compares a fitted number of the model with its value known by other means, where there is such a
+def parameter_sentence(number: OwnParameter) -> str:
+    """Sentence that compares a fitted parameter of the model with its value known by other means, where there is such a
     value."""
     ends = None if number.low is None or number.high is None else (number.low, number.high)
     text = f"The model's {number.name} is {value_text(number.value, number.unit, ends)} after everything"

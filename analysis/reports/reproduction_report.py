@@ -46,7 +46,7 @@ def render_reproduction_report(
     """HTML. pictures: by the number of the published figure."""
     sections = [*_models(reproduction), _overview(reproduction)]
     for figure in sorted(reproduction.figures, key=lambda each: each.figure):
-        played = _played_tables(reproduction) if figure.figure == 5 else ()
+        played = _tabulate_played(reproduction) if figure.figure == 5 else ()
         tables = (_findings_table(figure), *played)
         sections.append(_section(figure, pictures.get(figure.figure, ()), tables))
     low, high = reproduction.band_hz
@@ -74,7 +74,7 @@ def overview_lines(reproduction: Reproduction) -> tuple[str, ...]:
 
 
 def _models(reproduction: Reproduction) -> list[Section]:
-    """Before everything that was played through them."""
+    """Section on the models' errors, placed before the results that depend on them; empty without models."""
     if not reproduction.models:
         return []
     rows = tuple(
@@ -138,7 +138,7 @@ def _remarks(figure: FigureFindings) -> tuple[Table, ...]:
     return (Table(f"Remarks on figure {figure.figure}", ("", "What the analyses noted"), rows, folded=True),)
 
 
-def _played_tables(reproduction: Reproduction) -> tuple[Table, ...]:
+def _tabulate_played(reproduction: Reproduction) -> tuple[Table, ...]:
     header = ("", "Device", "Wanted", *_MEASURES)
     rows = tuple((row.name, row.device, row.signal, *_numbers(row)) for row in reproduction.played)
     tables = [Table("What was played, row by row", header, rows, notes=_ROW_NOTES)]

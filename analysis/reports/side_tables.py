@@ -8,7 +8,7 @@ from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import levels_words
 from analysis.reports.page import Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, mark_cut, number, signed_number
+from analysis.wording import NONE, format_signed, mark_cut, number
 from protocols.procedure.staircase import to_db
 
 
@@ -137,7 +137,7 @@ def _beside_direction(
     if felt_n is None or told_n is None or felt_bound or told_bound:
         yield NONE
     else:
-        yield signed_number(to_db(told_n) - to_db(felt_n), 1)
+        yield format_signed(to_db(told_n) - to_db(felt_n), 1)
 
 
 def _direction(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:

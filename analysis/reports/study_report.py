@@ -8,7 +8,7 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.population import Population
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.cue_tables import cue_section
-from analysis.reports.declared_section import declared_section
+from analysis.reports.declared_section import make_declared_section
 from analysis.reports.methods_text import methods_text
 from analysis.reports.page import Page, Section, render_page
 from analysis.reports.primary_tables import primary_section
@@ -95,14 +95,15 @@ def _detection_summary(analysis: StudyAnalysis) -> str:
 
 
 def _declared(analysis: StudyAnalysis) -> list[Section]:
-    """First: what was declared before the data is the result, all else is beside it."""
+    """Section on the declared (preregistered) contrast, the first of the report; empty without frequencies."""
     if not analysis.protocol.stimulus.frequencies_hz:
         return []
-    return [declared_section(analysis.declared, analysis.declared_result)]
+    return [make_declared_section(analysis.declared, analysis.declared_result)]
 
 
 def _models(qualities: Sequence[tuple[str, str]]) -> list[Section]:
-    """Before all numbers of the device: accelerations are as good as the model that turned them into forces."""
+    """Section on the quality of the models that converted accelerations to forces, placed before all values that depend
+    on them; empty without models."""
     if not qualities:
         return []
     points = tuple(f"{sessions}: {sentence}" for sessions, sentence in qualities)

@@ -10,7 +10,7 @@ from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.psychophysics.two_analyses import coverage_notes
 from analysis.reports.page import Table
 from analysis.threshold_words import threshold_words
-from analysis.wording import NONE, count, mark_cut, number, p_value, signed_number
+from analysis.wording import NONE, count, format_signed, mark_cut, number, p_value
 
 
 def threshold_table_text(analysis: StudyAnalysis) -> Table:
@@ -106,8 +106,8 @@ def pair_table(analysis: StudyAnalysis) -> Table:
         rows=tuple(
             (
                 f"{pair.second} − {pair.first}",
-                signed_number(pair.difference),
-                f"{signed_number(pair.lower)} to {signed_number(pair.upper)}",
+                format_signed(pair.difference),
+                f"{format_signed(pair.lower)} to {format_signed(pair.upper)}",
                 p_value(pair.p),
             )
             for pair in comparisons.pairs

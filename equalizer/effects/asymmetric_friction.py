@@ -6,7 +6,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_
 from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import regress_beside_linear, sliding_motion
+from equalizer.effects.starts.starting_values import regress_beside_linear, select_sliding_motion
 from equalizer.signals.signal import FloatArray
 
 _GUESS = 1.3
@@ -19,7 +19,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    motion = sliding_motion(evidence, axis)
+    motion = select_sliding_motion(evidence, axis)
     forward = np.asarray(motion.velocity > 0, dtype=np.float64)
     # Without a constant force in the regression, which would absorb the asymmetry.
     positive, negative = regress_beside_linear(motion, constant=False).fit(-forward, 1 - forward).strengths.tolist()

@@ -34,11 +34,11 @@ def with_reversed_commands(
     """Return the model whose answer to the command times `signs`, 1 or -1 each, is that of `model` to the command.
     Raises PlacingError."""
     way = np.asarray(signs, dtype=np.float64)
-    effects = [each for effect in model.effects for each in _reversed_effects(model, effect, way, (inputs, outputs))]
+    effects = [each for effect in model.effects for each in _reverse_effects(model, effect, way, (inputs, outputs))]
     return replace(model, input=model.input * way, effects=tuple(effects))
 
 
-def _reversed_effects(
+def _reverse_effects(
     model: MechanicalModel, effect: ModelEffect, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]
 ) -> tuple[ModelEffect, ...]:
     """One; one per axis where it differs with the direction and stood at all of them."""
@@ -49,15 +49,15 @@ def _reversed_effects(
         return (effect,)
     sites = find_sites(effect, inputs, outputs)
     if effect.law is not None:
-        return (replace(effect, law=_reversed_law(effect.law, sites[0], way, channels)),)
+        return (replace(effect, law=_reverse_law(effect.law, sites[0], way, channels)),)
     letters = [effect.axis] if effect.axis is not None else [axis_letter(inputs[site], inputs) for site in sites]
     return tuple(
-        replace(effect, axis=letter, parameters=_reversed_parameters(effect, site, way))
+        replace(effect, axis=letter, parameters=_reverse_parameters(effect, site, way))
         for site, letter in zip(sites, letters, strict=True)
     )
 
 
-def _reversed_parameters(effect: ModelEffect, site: int, way: FloatArray) -> dict[str, float]:
+def _reverse_parameters(effect: ModelEffect, site: int, way: FloatArray) -> dict[str, float]:
     numbers = dict(effect.parameters)
     for place, name in enumerate(TILTED.get(effect.kind, ()), start=1):
         if name in numbers:
@@ -73,7 +73,7 @@ def _reversed_parameters(effect: ModelEffect, site: int, way: FloatArray) -> dic
     return numbers
 
 
-def _reversed_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
+def _reverse_law(law: Law, site: int, way: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
     """The formula with the signals of reversed axes negated, and its value too where its own axis is reversed."""
     inputs, outputs = channels
     letters, against = axis_names(inputs), set[str]()

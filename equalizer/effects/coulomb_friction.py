@@ -11,7 +11,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_
 from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import regress_beside_linear, sliding_motion
+from equalizer.effects.starts.starting_values import regress_beside_linear, select_sliding_motion
 from equalizer.signals.signal import FloatArray
 
 
@@ -21,7 +21,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    motion = sliding_motion(evidence, axis)
+    motion = select_sliding_motion(evidence, axis)
     level = float(regress_beside_linear(motion).fit(-np.sign(motion.velocity)).strengths[0])
     return ({"level": level},) if level > 0 else ()
 

@@ -33,7 +33,7 @@ _TAKEN = {
     *(prefix + letter for letter in LETTERS for prefix in (*DERIVATIVES, COMMAND)),
 }
 LARGEST, STEEPEST = 1e15, 20.0
-"""Largest magnitude of a free number, and of an exponent."""
+"""Largest magnitude of a free parameter, and of an exponent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +169,7 @@ def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(LETTERS[: len(channels)])
 
 
-def reading_names(channels: Channels) -> tuple[str, ...]:
+def names_of_readings(channels: Channels) -> tuple[str, ...]:
     """Names of the response's channels in a formula: ax, ay, az of accelerations, or as the recording calls them."""
     found: dict[int, str] = {}
     for name, number in _response_signals(channels).items():

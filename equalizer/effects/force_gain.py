@@ -6,8 +6,8 @@ from equalizer.effects.effect import ALL_SITES, Effect, OnCommand, Parameter, Va
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
-LEAST = 1e-4
-"""Least deviation of a gain from 1 that is tried. By hand."""
+_LEAST_DEVIATION = 1e-4
+"""Least deviation of a gain from 1 that is a starting value. By hand."""
 
 
 def _scale_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
@@ -15,16 +15,16 @@ def _scale_force(commands: FloatArray, step_s: float, values: Values) -> FloatAr
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """gain = 1 + sum(u f) / sum(u²): least squares of the missing force f over the command u."""
     which, used = slice(None) if axis == ALL_SITES else slice(axis, axis + 1), evidence.used > 0
     commanded, missing = evidence.command[used, which], evidence.axis_force[used, which]
-    # Missing force over command, by least squares; also over the command of the sample before, as the estimated force
-    # may lie a sample behind.
+    # Also over the command of the sample before, because the estimated force may lag by a sample.
     shares = [
         float(np.sum(np.roll(commanded, shift, axis=0) * missing) / max(np.sum(commanded**2), np.finfo(float).tiny))
         for shift in (0, 1)
     ]
     gain = 1 + max(shares, key=abs)
-    return ({"gain": gain},) if gain > 0 and abs(gain - 1) > LEAST else ()
+    return ({"gain": gain},) if gain > 0 and abs(gain - 1) > _LEAST_DEVIATION else ()
 
 
 EFFECT = Effect(

@@ -65,7 +65,7 @@ def _lose_positions_as_measured(
     before: FloatArray, after: FloatArray, position: FloatArray, measured: FloatArray
 ) -> FloatArray:
     """Repeats positions where the response repeats, provided that the measured position shows that the same logger read
-    it; then also where only the position tells, because the response hardly changed from one sample to the next."""
+    it; then also where only the position shows it, because the response hardly changed from one sample to the next."""
     lost = np.any(after != before, axis=1)
     if not lost.any():
         return position
@@ -82,8 +82,8 @@ def _repeat_rows(position: FloatArray, lost: Flags) -> FloatArray:
 
 
 def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> Flags:
-    """Where a measured position is far nearer to the one before than to its own, in units of the noise, which most
-    samples show (median absolute deviation)."""
+    """Mask of the samples whose measured position is far nearer to the simulated position of the sample before than to
+    their own, in units of the noise (1.4826 times the median absolute deviation)."""
     error = measured - position
     noise = 1.4826 * np.nanmedian(np.abs(error), axis=0)
     step = np.diff(position, axis=0, prepend=position[:1])

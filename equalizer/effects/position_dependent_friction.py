@@ -7,7 +7,7 @@ from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.instant import X_FREE, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import regress_beside_linear, sliding_motion
+from equalizer.effects.starts.starting_values import regress_beside_linear, select_sliding_motion
 from equalizer.signals.signal import FloatArray
 
 
@@ -20,7 +20,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    motion = sliding_motion(evidence, axis)
+    motion = select_sliding_motion(evidence, axis)
     sign = -np.sign(motion.velocity)
     found = regress_beside_linear(motion).fit(sign, sign * motion.position, sign * motion.position**2)
     level, slope, bend = found.strengths.tolist()

@@ -57,11 +57,11 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     if channel > 0 or p not in (2, 3):
         return ()
     used = evidence.used > 0
-    ours, theirs = np.zeros((2, int(used.sum()), 3))
-    ours[:, :p], theirs[:, :p] = evidence.predicted[used], evidence.response[used]
-    left, _, right = np.linalg.svd(theirs.T @ ours)
-    handed = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
-    vector = np.degrees(_rotation_vector(left @ handed @ right))
+    predicted_xyz, measured_xyz = np.zeros((2, int(used.sum()), 3))
+    predicted_xyz[:, :p], measured_xyz[:, :p] = evidence.predicted[used], evidence.response[used]
+    left, _, right = np.linalg.svd(measured_xyz.T @ predicted_xyz)
+    proper = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
+    vector = np.degrees(_rotation_vector(left @ proper @ right))
     if not LEAST_DEG < np.linalg.norm(vector) < LARGEST_DEG:
         return ()
     return (dict(zip(ABOUT, vector.tolist(), strict=True)),)

@@ -7,7 +7,7 @@ from equalizer.effects.simulation.dry_friction_kernel import friction_force
 from equalizer.effects.simulation.instant import V_FREE, V_PER_N, V
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import best_trial, regress_beside_linear, sliding_motion
+from equalizer.effects.starts.starting_values import best_trial, regress_beside_linear, select_sliding_motion
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -36,7 +36,7 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    motion = sliding_motion(evidence, axis)
+    motion = select_sliding_motion(evidence, axis)
     sign, rms = np.sign(motion.velocity), float(np.sqrt(np.mean(motion.velocity**2)))
     speed, found = best_trial(
         regress_beside_linear(motion),

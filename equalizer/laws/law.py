@@ -14,14 +14,15 @@ KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
 @dataclass(frozen=True, slots=True)
 class Law:
     """A formula with free parameters, and what it acts on. Raises LawError where the formula is not in the language, or
-    its numbers do not fit it."""
+    its parameters do not fit it."""
 
     expression: str
-    """Template with free numbers p0, p1, …: '-p0*abs(vy)**p1*sign(vy)'. Literal numbers in it are part of the form."""
+    """Template with free parameters p0, p1, …: '-p0*abs(vy)**p1*sign(vy)'. Literal numbers in it are part of the
+    form."""
     numbers: tuple[float, ...]
     """Values of p0, p1, … in SI units."""
     units: tuple[str, ...]
-    """Units of the numbers; empty where not known."""
+    """Units of the parameters; empty where not known."""
     acts_on: ActsOn
     """What the law acts on. force: it is added to the force at the axis; command, response: it replaces that of the
     axis."""
@@ -42,17 +43,17 @@ class Law:
 
     @property
     def tree(self) -> Node:
-        """Syntax tree of the expression; its free numbers are nodes `Free` with their place."""
+        """Syntax tree of the expression; its free parameters are nodes `Free` with their place."""
         return parse_formula(self.expression, template=True)[0]
 
     @property
     def text(self) -> str:
-        """The formula with its numbers, to five digits."""
+        """The formula with the values of its parameters, to five digits."""
         return format_formula(self.tree, self.numbers)
 
     @property
     def exact_text(self) -> str:
-        """The formula with all digits: `law_of` reads the same numbers back."""
+        """The formula with all digits: `law_of` reads the same values back."""
         return format_formula(self.tree, self.numbers, None)
 
     @property
@@ -73,9 +74,9 @@ def law_of(text: str, acts_on: ActsOn, axis: str) -> Law:
 
 
 Role = Literal["factor", "exponent", "positive", "phase", "offset"]
-"""factor: terms are proportional to it; positive: a width, a time, a pitch; phase: of a sine, rad; offset: anything
-else."""
-_SECOND: dict[str, Role] = {
+"""Role of a free parameter. factor: terms are proportional to it; positive: a width, a time, a pitch; phase: of a sine
+(rad); offset: any other."""
+_SECOND_ARGUMENT: dict[str, Role] = {
     "**": "exponent",
     "/": "positive",
     "lag": "positive",
@@ -85,7 +86,7 @@ _SECOND: dict[str, Role] = {
 
 
 def roles(tree: Node) -> dict[int, Role]:
-    """Role of each free number, by its place; where a number occurs several times, by its first occurrence."""
+    """Role of each free parameter, by its place; where one occurs several times, by its first occurrence."""
     found: dict[int, Role] = {}
     _collect_roles(tree, "factor", found)
     return found
@@ -100,13 +101,15 @@ def _collect_roles(node: Node, role: Role, found: dict[int, Role]) -> None:
     for place, part in enumerate(node.parts):
         _collect_roles(
             part,
-            _SECOND.get(node.name, _first_part_role(node.name, role)) if place else _first_part_role(node.name, role),
+            _SECOND_ARGUMENT.get(node.name, _first_part_role(node.name, role))
+            if place
+            else _first_part_role(node.name, role),
             found,
         )
 
 
 def _first_part_role(name: str, role: Role) -> Role:
-    """Roles that an operator gives to its first argument, or to each."""
+    """Role that an operator in the role `role` gives to its first argument; + - * to each."""
     if name in ("+", "-", "neg"):
         return role
     if name in ("*", "/"):

@@ -32,7 +32,7 @@ NEAR_SHARE = 0.3
 """Standard deviation of the Gaussian weight around a place, as a share of the calibration's reach. Without a weight,
 far positions bend the slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
 MOST_TOLD = 10
-"""Problems at positions that are told one by one."""
+"""Number of problems at positions that are listed one by one."""
 
 
 class CalibrationError(ListedProblemsError):
@@ -73,7 +73,7 @@ class LinkageCalibration:
     inertia_kg: FloatArray
     """(n, 3, 3)"""
     gravity_n: FloatArray
-    """(n, 3); NaN where no reading and no mirror line tells it."""
+    """(n, 3); NaN where neither a reading nor a mirror line gives it."""
     filled: FloatArray
     """(n,), 1 where a mirror line gave what could not be read, else 0."""
     line_deg: FloatArray
@@ -100,7 +100,7 @@ def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
     at_places = [
         problem
         for number, filled in enumerate(calibration.filled)
-        for problem in reading_problems(
+        for problem in check_reading(
             LinkageReading(*(getattr(calibration, name)[number] for name in shapes)), gravity_known=not filled
         )
     ]
@@ -124,7 +124,7 @@ def difference_problems(difference: float) -> Iterator[str]:
         )
 
 
-def reading_problems(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
+def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
     """One sentence each."""
     where = "(" + ", ".join(f"{1000 * each:.0f}" for each in reading.position_m) + ") mm"
     jacobian, inertia = reading.jacobian, reading.inertia_kg

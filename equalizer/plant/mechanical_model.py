@@ -229,4 +229,4 @@ def _law_problems(effect: ModelEffect) -> Iterator[str]:
     if effect.law is None:
         yield f"{effect.kind} lacks expression, acts_on or axis"
     if effect.parameters:
-        yield f"{effect.kind} has its numbers in its expression; beside it stands {', '.join(effect.parameters)}"
+        yield f"{effect.kind} has its parameters in its expression; it also gives {', '.join(effect.parameters)}"

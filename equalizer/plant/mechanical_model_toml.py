@@ -28,7 +28,7 @@ _MODEL_KEYS = ("name", "quantity", *MATRICES, "rotational")
 _TABLES = ("model", "sensor", "actuator", "effect", "tolerance", "provenance", "rotational")
 
 UNITS = "units"
-"""Key of the provenance for the units of commands and motion, where the model's numbers are not in SI units."""
+"""Key of the provenance for the units of commands and motion, where the model's values are not in SI units."""
 
 Numbers = TypeVar("Numbers", SensorLimits, ActuatorLimits, Tolerance)
 

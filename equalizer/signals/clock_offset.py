@@ -1,4 +1,12 @@
-"""Clock offset of two recordings of the same motion, from the peak of their normalised cross-correlation."""
+"""Clock offset of two recordings of the same motion, from the peak of their normalised cross-correlation.
+
+For signals a and b without their means, on one grid, at lag l:
+
+    r(l) = sum a(k + l) b(k) / sqrt(sum a(k + l)² sum b(k)²),    sums over the samples where both overlap.
+
+The offset is that of the largest |r|, interpolated by a spline. It is refused where |r| is small, where the maximum
+lies at the end of the searched range, and where another peak is about as high, as with periodic signals.
+"""
 
 from dataclasses import dataclass
 
@@ -12,9 +20,16 @@ IntArray = npt.NDArray[np.signedinteger]
 BoolArray = npt.NDArray[np.bool_]
 
 LEAST_CORRELATION = 0.5
-"""Least correlation of two signals for their offset to be trusted."""
-RIVAL = 0.98
-"""Height of a second peak, relative to the highest, at which the offset is ambiguous."""
+"""Least |r| for an offset to be trusted. By hand."""
+AMBIGUOUS = 0.98
+"""Height of a second peak, relative to the highest, above which the offset is ambiguous. By hand."""
+LEAST_OVERLAP = 0.25
+"""Least overlap of the two signals, as a share of the shorter one. By hand."""
+LEAST_LAGS = 8
+"""Least number of lags to search: the spline of fifth order needs six."""
+ENERGY_FLOOR = 1e-9
+"""Least product of the overlapping energies, relative to that of the whole signals: silent stretches must not give a
+large r. By hand."""
 
 
 class NoOffsetError(ValueError):
@@ -41,11 +56,11 @@ def offset_by_correlation(reference: Samples, other: Samples, about_s: float, wi
     """
     rate_hz = 2 * max(1 / float(np.median(np.diff(part.times_s))) for part in (reference, other))
     first, second = (_resample_centred(part, rate_hz) for part in (reference, other))
-    correlation = _normalised_correlation(first, second)
+    correlation = _correlate_normalised(first, second)
     lags = np.arange(-(len(second) - 1), len(first))
     offsets_s = reference.times_s[0] - other.times_s[0] + lags / rate_hz
     allowed = (np.abs(offsets_s - about_s) <= within_s) & _has_enough_overlap(lags, len(first), len(second))
-    if allowed.sum() < 8:
+    if allowed.sum() < LEAST_LAGS:
         raise NoOffsetError("the two signals do not overlap within the range of offsets that is searched; widen it")
     offsets_s, correlation = offsets_s[allowed], correlation[allowed]
     peak = int(np.argmax(np.abs(correlation)))
@@ -69,9 +84,8 @@ def _resample_centred(samples: Samples, rate_hz: float) -> FloatArray:
     return np.nan_to_num(centred, nan=0.0)
 
 
-def _normalised_correlation(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Cross-correlation of (n,) and (m,) at each of the n + m - 1 lags, divided by the energy of both where they
-    overlap."""
+def _correlate_normalised(first: FloatArray, second: FloatArray) -> FloatArray:
+    """r of the module for signals (n,) and (m,), at each of the n + m - 1 lags -(m - 1) to n - 1."""
     # Here and below: SciPy's signal and interpolation modules take longer to import than a diagnosis that does not need
     # them.
     from scipy import signal as sg
@@ -79,23 +93,24 @@ def _normalised_correlation(first: FloatArray, second: FloatArray) -> FloatArray
     raw = sg.correlate(first, second, mode="full", method="fft")
     first_energy = sg.correlate(first**2, np.ones(len(second)), mode="full", method="fft")
     second_energy = sg.correlate(np.ones(len(first)), second**2, mode="full", method="fft")
-    floor = 1e-9 * float(np.sum(first**2) * np.sum(second**2))
+    floor = ENERGY_FLOOR * float(np.sum(first**2) * np.sum(second**2))
     normalised: FloatArray = raw / np.sqrt(np.maximum(first_energy * second_energy, max(floor, np.finfo(float).tiny)))
     return normalised
 
 
 def _has_enough_overlap(lags: IntArray, first: int, second: int) -> BoolArray:
-    """Mask of the lags at which signals of these lengths overlap by at least a quarter of the shorter one."""
+    """Mask of the lags at which signals of these lengths overlap by at least `LEAST_OVERLAP`."""
     overlap = np.minimum(first, lags + second) - np.maximum(0, lags)
-    enough: BoolArray = overlap >= 0.25 * min(first, second)
+    enough: BoolArray = overlap >= LEAST_OVERLAP * min(first, second)
     return enough
 
 
 def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None:
+    """Raises NoOffsetError where another peak than that at the index `peak` is about as high. height: |r|."""
     from scipy import signal as sg
 
     peaks, _ = sg.find_peaks(height)
-    rivals = [place for place in peaks if abs(place - peak) > 2 and height[place] > RIVAL * height[peak]]
+    rivals = [place for place in peaks if abs(place - peak) > 2 and height[place] > AMBIGUOUS * height[peak]]
     if rivals:
         raise NoOffsetError(
             f"offsets of {offsets_s[peak]:g} s and {offsets_s[rivals[0]]:g} s agree equally well, as happens with "
@@ -104,6 +119,7 @@ def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None
 
 
 def _interpolate_peak(offsets_s: FloatArray, correlation: FloatArray, peak: int) -> ClockOffset:
+    """The maximum of |r| within a lag of the index `peak`, on a spline of fifth order."""
     from scipy.interpolate import make_interp_spline
 
     around = slice(max(0, peak - 8), peak + 9)

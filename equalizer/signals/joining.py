@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 
 from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording_checks import signals_of
 from equalizer.signals.signal import Signal
 
 
 def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
-    """All parts end to end; their segments move along. Time stamps are dropped, because there were pauses.
+    """All parts end to end; their segments move along. Time stamps are dropped, because there were pauses; a signal
+    that one of the parts lacks is dropped, too (`signals_left_out`).
 
-    Raises ValueError for no parts, or for parts of different devices, rates or channels.
+    Raises ValueError for no parts, or for parts of different devices, rates, holds of the command, or channels.
     """
     if not parts:
         raise ValueError("there is nothing to join; give at least one recording")
@@ -23,6 +25,11 @@ def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
             raise ValueError(
                 f"a recording of {part.device} at {part.sample_rate_hz:g} Hz cannot follow one of {first.device} "
                 f"at {first.sample_rate_hz:g} Hz"
+            )
+        if part.hold is not first.hold:
+            raise ValueError(
+                f"a command held by {part.hold.value} cannot follow one held by {first.hold.value}: a recording has a "
+                "single hold"
             )
     starts = np.concatenate([[0], np.cumsum([len(part) for part in parts])])
     segments = [
@@ -41,6 +48,12 @@ def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
         segments=tuple(segments),
         meta=meta,
     )
+
+
+def signals_left_out(parts: Sequence[Recording]) -> tuple[str, ...]:
+    """Names of the signals that some parts have and others lack, so that `join` drops them."""
+    names = [set(signals_of(part)) for part in parts]
+    return tuple(sorted(set().union(*names) - names[0].intersection(*names))) if names else ()
 
 
 def _shift_segment(segment: Segment, by: int) -> Segment:

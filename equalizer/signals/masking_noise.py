@@ -16,7 +16,7 @@ FULL_SCALE = 2**15 - 1
 """Largest value of a 16 bit sample."""
 
 
-def masking_noise(
+def make_masking_noise(
     seconds: int, low_hz: float, high_hz: float, seed: int, sample_rate_hz: int = 44_100
 ) -> NDArray[np.int16]:
     """Pink noise, mono, 16 bit, shape (seconds * sample_rate_hz,).

@@ -70,7 +70,7 @@ def _draw_group(lines: IntArray, n: int, axes: int, random: np.random.Generator)
     return _best_of_draws(draw)
 
 
-def interleaved_multisine(lines: IntArray, n: int, axes: int, seed: int) -> FloatArray:
+def make_interleaved_multisine(lines: IntArray, n: int, axes: int, seed: int) -> FloatArray:
     """One period, shape (n, axes), whose norm over the axes peaks at 1. Each line drives one axis alone: axis a has
     every `axes`-th line, beginning with the a-th."""
     random, axis = np.random.default_rng(seed), np.arange(len(lines)) % axes

@@ -25,14 +25,14 @@ QUANTITY_WORDS = {
 _QUANTITY = {word: quantity for quantity, words in QUANTITY_WORDS.items() for word in words.split()}
 _LARGE, _SMALL = "A-ZÀ-ÖØ-Þ", "a-zß-öø-ÿ"
 _WORD = re.compile(f"[{_LARGE}]?[{_SMALL}]+|[{_LARGE}]+(?![{_SMALL}])")
-_OF_ANGLE = "rate"
-"""Word for a derivative behind an angle: `yaw rate`."""
-_OF_ANOTHER = frozenset(
+_DERIVATIVE = "rate"
+"""Word behind an angle that makes it an angular velocity: `yaw rate`."""
+_AMBIGUOUS = frozenset(
     ["dot", "ddot", "d", "delta", "diff", "rate", "error", "gyro", "pedal", "time", "ratio", "mode", "limit"]
 )
 """Words that make the quantity ambiguous: `theta_dot`, `gyro pitch`, `travel time`."""
 SEVERAL_MEANINGS = frozenset(["spannung", "tensión", "yaw", "pitch", "roll"])
-"""Words that also name a stress, a distance, a turning speed: a stated unit decides."""
+"""Words that also name a stress, a distance or an angular velocity: a stated unit decides."""
 
 
 def words_in(name: str) -> list[str]:
@@ -48,7 +48,7 @@ def quantity_in(name: str) -> str:
     if last is None:
         return ""
     found = _QUANTITY[words[last]]
-    if found == "angle" and words[last + 1 : last + 2] == [_OF_ANGLE]:
+    if found == "angle" and words[last + 1 : last + 2] == [_DERIVATIVE]:
         found = "velocity"
         del words[last + 1]
-    return "" if _OF_ANOTHER & set(words) else found
+    return "" if _AMBIGUOUS & set(words) else found

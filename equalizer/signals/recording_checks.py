@@ -9,7 +9,7 @@ from equalizer.signals.recording import SEGMENT_KINDS, SEGMENT_ROLES, Recording,
 from equalizer.signals.signal import FloatArray, Signal
 
 
-def recording_problems(recording: Recording) -> tuple[str, ...]:
+def check_recording(recording: Recording) -> tuple[str, ...]:
     """Sentences, one for everything that contradicts the format. Empty = consistent. NaN counts as missing, not as
     wrong."""
     found = [*_signal_problems(recording), *segment_problems(recording.segments, len(recording))]
@@ -48,8 +48,8 @@ def unusable_channels(signals: Sequence[Signal]) -> Iterator[tuple[str, bool]]:
 
 
 def segment_problems(segments: Sequence[Segment], samples: int) -> Iterator[str]:
-    """Sentences on segments outside the recording, with unknown kinds or impossible numbers, and on overlaps. samples:
-    length of the recording."""
+    """Sentences on segments outside the recording, with unknown kinds or roles, with an amplitude or period out of
+    range, and on overlaps. samples: length of the recording."""
     for number, segment in enumerate(segments, start=1):
         for problem in _problems_of_segment(segment, samples):
             yield f"segment {number} {problem}"

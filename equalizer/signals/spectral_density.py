@@ -44,13 +44,15 @@ def _welch_average(
     starts = range(0, len(first) - length + 1, length - length // 2)
     total = np.zeros((length // 2 + 1, *first.shape[1:]), dtype=np.complex128)
     for start in starts:
-        lines = _windowed_spectrum(first[start : start + length], window)
-        total += lines.conj() * (lines if other is first else _windowed_spectrum(other[start : start + length], window))
+        lines = _transform_windowed(first[start : start + length], window)
+        total += lines.conj() * (
+            lines if other is first else _transform_windowed(other[start : start + length], window)
+        )
     density = total / (len(starts) * rate_hz * float(np.sum(window**2)))
     # Each line but those at zero and at half the rate stands for its negative frequency, too.
     density[1 : len(density) - (length % 2 == 0)] *= 2
     return np.asarray(np.fft.rfftfreq(length, 1 / rate_hz), dtype=np.float64), np.asarray(density)
 
 
-def _windowed_spectrum(stretch: FloatArray, window: FloatArray) -> ComplexArray:
+def _transform_windowed(stretch: FloatArray, window: FloatArray) -> ComplexArray:
     return np.asarray(np.fft.rfft(window * (stretch - stretch.mean(axis=0)), axis=0))

@@ -1,4 +1,5 @@
-"""Other spellings of units, as files of others use them: `RPM`, `m/sec2`, `°/s`, `kgf·cm`, `oz-in`, `A (peak)`.
+"""Other spellings of units, as recordings of other laboratories use them: `RPM`, `m/sec2`, `°/s`, `kgf·cm`, `oz-in`, `A
+(peak)`.
 
 A spelling is rewritten, never interpreted: what is not listed stays as it is.
 """
@@ -12,6 +13,7 @@ _LETTERS = {
     "º": "°", "˚": "°", "μ": "u", "µ": "u", "°": "deg", "Ω": "ohm", "·": " ", "•": " ", "∙": " ", "⋅": " ", "×": " ",
     "*": " ", "−": "-", "–": "-",
 }  # fmt: skip
+"""Signs of other alphabets, and the sign or symbol that is meant."""
 _WORDS = {
     "s": "sec secs sek second seconds",
     "ms": "msec msecs millisec millisecond milliseconds",
@@ -48,29 +50,34 @@ _WORDS = {
     "degC": "celsius",
     "degF": "fahrenheit",
 }
+"""Symbols, each with its other spellings."""
 _SPELLED = {word: unit for unit, words in _WORDS.items() for word in words.split()} | {
     unit.lower(): unit for unit in _WORDS if len(unit) > 2
 }
-_WHOLE = {
+_WHOLE_UNITS = {
     "dps": "deg/s", "mps": "m/s", "mps2": "m/s^2", "r/min": "rpm", "U/min": "rpm", "deg C": "degC", "deg F": "degF",
     "deg. C": "degC", "degree C": "degC", "degrees C": "degC", "% RH": "%", "%RH": "%", "%rh": "%",
     "ozin": "ozf in", "inoz": "ozf in", "lbin": "lbf in", "inlb": "lbf in", "lbft": "lbf ft", "ftlb": "lbf ft",
     "lbfin": "lbf in", "lbfft": "lbf ft", "ozfin": "ozf in", "kgfcm": "kgf cm", "kgcm": "kgf cm", "gfcm": "gf cm",
     "gcm": "gf cm", "N_m": "N m", "kg f": "kgf", "lb f": "lbf", "g f": "gf",
 }  # fmt: skip
+"""Units that are looked up as a whole, because their parts have other meanings."""
 _TORQUES = {
     "oz in": "ozf in", "in oz": "ozf in", "lb in": "lbf in", "in lb": "lbf in", "lb ft": "lbf ft", "ft lb": "lbf ft",
     "kg cm": "kgf cm", "g cm": "gf cm",
 }  # fmt: skip
-"""A weight on a lever: a mass times a length is no signal, and its square (`oz in^2`) is an inertia."""
-_OFTEN_MEANT = {"pound": "lbf", "pounds": "lbf", "gram": "gf", "grams": "gf", "gs": "g", "nm": "N m"}
-_ALONE = {"c": "degC", "f": "degF", "g": "g"}
-"""Suggested only: pounds and grams are masses too, and a capital alone is another symbol than a small letter."""
-_ALIKE, _ALIKE_IN_PRODUCT = 0.8, 0.9
-"""Letters in common: of a unit that is suggested, and of each that was guessed in a product."""
+"""Torques written with a unit of mass: a mass times a length is no signal, and `oz in^2` is an inertia."""
+_SUGGESTED = {"pound": "lbf", "pounds": "lbf", "gram": "gf", "grams": "gf", "gs": "g", "nm": "N m"}
+_SUGGESTED_ALONE = {"c": "degC", "f": "degF", "g": "g"}
+"""Suggestions that are never applied, the second ones where the symbol is the whole unit: pounds and grams are masses,
+too, and a capital is another symbol than a small letter."""
+_LEAST_SIMILARITY, _LEAST_SIMILARITY_IN_PRODUCT = 0.8, 0.9
+"""Least similarity (0 to 1, `difflib`) of a suggested symbol that is the whole unit, and of one within a product. By
+hand."""
 _RATE = re.compile(r"(m|mm|cm|um|rad|mrad|deg|rev)s\^-([12])")
 """`ms-2` is written for m/s^2, never for one over milliseconds squared."""
 _PEAK = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.IGNORECASE)
+"""Volts and amperes with how they were measured, which is no unit."""
 
 
 def respell(text: str, known: Collection[str]) -> str:
@@ -82,7 +89,7 @@ def respell(text: str, known: Collection[str]) -> str:
     plain = re.sub(r"\s*/\s*", "/", plain.strip().rstrip("."))
     plain = re.sub(r"(?<=[A-Za-z])(-[1-9]|[2-9])(?![A-Za-z0-9])", r"^\1", plain)
     plain = _RATE.sub(lambda rate: f"{rate[1]}/s" + ("^2" if rate[2] == "2" else ""), plain)
-    plain = _WHOLE.get(plain.replace("lbs", "lb"), plain)
+    plain = _WHOLE_UNITS.get(plain.replace("lbs", "lb"), plain)
     plain = re.sub(r"(?<=[A-Za-z0-9])[.-](?=[A-Za-z])", " ", plain)
     plain = re.sub(r"[A-Za-z]+", lambda word: _respell_symbol(word[0], known), plain)
     return _TORQUES.get(plain, plain)
@@ -100,6 +107,7 @@ def nearest_unit(text: str, known: Collection[str]) -> str:
 
 
 def _in_ascii(text: str) -> str:
+    """The text with the signs of `_LETTERS` replaced."""
     return "".join(_LETTERS.get(letter, letter) for letter in text)
 
 
@@ -110,14 +118,17 @@ def _respell_symbol(word: str, known: Collection[str]) -> str:
 
 
 def _nearest(word: str, known: Collection[str], alone: bool) -> str:
-    """alone: whether it is the whole unit."""
+    """The known symbol with the most similar spelling; empty where none is similar. alone: whether the word is the
+    whole unit."""
     if word in known:
         return word
     if len(word) == 1 and word.isupper():
-        return _ALONE.get(word.lower(), "") if alone else ""
+        return _SUGGESTED_ALONE.get(word.lower(), "") if alone else ""
     by_size = sorted(known, key=lambda symbol: (len(symbol), symbol.islower(), symbol[0] == word[0], symbol))
     # The last of a spelling counts: `mm` for `MM`, not `Mm`; `MPa` for `Mpa`.
-    spelled = {**_SPELLED, **{symbol.lower(): symbol for symbol in by_size}, **_OFTEN_MEANT}
-    spelled |= _ALONE if alone else {}
-    close = get_close_matches(word.lower(), spelled, n=1, cutoff=_ALIKE if alone else _ALIKE_IN_PRODUCT)
+    spelled = {**_SPELLED, **{symbol.lower(): symbol for symbol in by_size}, **_SUGGESTED}
+    spelled |= _SUGGESTED_ALONE if alone else {}
+    close = get_close_matches(
+        word.lower(), spelled, n=1, cutoff=_LEAST_SIMILARITY if alone else _LEAST_SIMILARITY_IN_PRODUCT
+    )
     return spelled[close[0]] if close else ""

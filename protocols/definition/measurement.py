@@ -55,9 +55,9 @@ class MeasurementSettings:
         Field(
             ge=0,
             le=1,
-            description="A trial without a larger share of the accelerometer's packets, or of the recorded ticks, has "
-            "no trustworthy acceleration: nothing is said of what was delivered. Default 0.05: what is bridged changes "
-            "an amplitude by less than a percent.",
+            description="A trial that lacks a larger share of the accelerometer's packets, or of the recorded ticks, "
+            "has no trustworthy acceleration: nothing is said of what was delivered. Default 0.05: what is bridged "
+            "changes an amplitude by less than a percent.",
         ),
     ] = 0.05
     accelerometer_needed: Annotated[

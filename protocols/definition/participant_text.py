@@ -37,7 +37,7 @@ class TextSettings:
     ] = field(default_factory=dict, hash=False)
 
     @model_validator(mode="after")
-    def _resolved(self) -> Self:
+    def _resolve_answers(self) -> Self:
         if self.language != "en" and not self.words:
             allowed = "the texts themselves in text.words, which `hapteq` fills in where it reads the file"
             refuse([Problem("language", f'is "{self.language}", and its texts are missing', allowed)])

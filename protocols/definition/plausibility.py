@@ -1,6 +1,6 @@
 """Plausible range of the handle's position readings. A reading beyond it is a sensor fault: the force is released.
 
-Checked at every tick by `study/devices/governor`. A bound that is too narrow ends sound trials; one that is too wide
+Checked at every tick by `study/devices/governor`. A bound that is too narrow ends valid trials; one that is too wide
 lets spring and damper answer a false position with force, up to the feedback's cap.
 """
 

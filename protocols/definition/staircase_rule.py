@@ -161,7 +161,7 @@ class StaircaseRule:
 
 
 def _placement_problems(rule: StaircaseRule) -> list[Problem]:
-    """What of the up-down rule does not go with Psi, and the other way round."""
+    """Contradictions between the keys of the up-down rule and those of Psi."""
     bayesian, problems = rule.bayesian, []
     if bayesian.spread_db and not rule.is_bayesian:
         wrong = f"is {bayesian.spread_db} dB, but bayesian.trials is 0"

@@ -52,8 +52,8 @@ def load_protocol(text: str, source: str) -> Protocol:
 def protocol_from_values(values: dict[str, Any], source: str) -> Protocol:
     """Check plain values from TOML or JSON and make the protocol. Numbers must be numbers, not text or booleans.
     Raises ProtocolError."""
-    if strange := tuple(_no_protocol_values(values, "")):
-        raise ProtocolError(source, strange)
+    if unsupported := tuple(_no_protocol_values(values, "")):
+        raise ProtocolError(source, unsupported)
     kind = values.get("kind")
     if not isinstance(kind, str) or kind not in ADAPTERS:
         wrong = "is missing" if kind is None else f'is "{kind}"' if isinstance(kind, str) else f"is {shown(kind)}"

@@ -1,9 +1,15 @@
-"""Psi: the level that is expected to tell most of threshold and slope, from all answers of the run so far.
+"""Psi method: the next level is that with the least expected posterior entropy of threshold and slope.
 
-A grid holds the probability of every threshold and slope. Before each trial, the entropy that would be left is
-computed for every level, averaged over a right and a wrong answer; the level with the least is played. The next level
-is a fixed function of the answers before it, so a log folds to the same levels, and the likelihood of the answers needs
-no correction. Levels end at the cap; thresholds of the grid go beyond it, so that the answers can say so.
+A grid holds the posterior probability p(t, s) of every threshold t and slope s after all answers of the run so far,
+from a flat prior. For every level x, with P(x; t, s) of a right answer, the entropy after the next answer is expected
+to be
+
+    H(x) = - sum over both answers a, and over t, s, of  j_a log(j_a / c_a),
+    j_a = P_a(x; t, s) p(t, s),    c_a = sum of j_a over t, s (the probability of the answer).
+
+The next level is a fixed function of the answers before it, so a log folds to the same levels, and the likelihood of
+the answers needs no correction. Levels end at the force cap; thresholds of the grid go beyond it, so that the posterior
+can say that the threshold lies above the cap.
 
 Source: L. L. Kontsevich, C. W. Tyler, Vision Res. 39 (1999), 2729-2737.
 """
@@ -18,14 +24,14 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 LEVEL_STEP_DB, LOWEST_DB = 1.0, -34.0
-"""Levels: from the cap down to this below it."""
+"""Spacing of the levels, and the lowest of them relative to the cap (dB)."""
 BEYOND_DB = 12.0
-"""Thresholds of the grid end this far above the cap and below the lowest level."""
+"""Thresholds of the grid end this far (dB) above the cap and below the lowest level."""
 SLOPES = tuple(float(slope) for slope in np.geomspace(0.8, 5.0, 7))
-"""Slopes of the Weibull curve over newtons, equally probable a priori. Most people have about 2."""
+"""Slopes of the Weibull curve over newtons, equally probable a priori, spaced geometrically about 2. By hand."""
 LAPSE = 0.02
-"""Share of inattentive answers, half of them wrong, as in the other analyses: without it a single lapse at a high level
-could never be undone."""
+"""Share of inattentive answers, half of them wrong: P(right) ends at 0.99, a lapse rate of 0.01 in the words of
+`analysis.psychophysics.hierarchy.curve`. By hand: without it a single lapse at a high level could never be undone."""
 TARGET = 0.5 ** (1 / 3)
 """Share of right answers at the threshold, lapses apart: that to which the published staircase converges."""
 SAME_BITS = 1e-9
@@ -47,7 +53,7 @@ class Estimate:
 
 @cache
 def levels_db(cap_db: float) -> FloatArray:
-    """Ascending; the last is the cap itself."""
+    """(levels,), ascending: levels in dB re 1 N, LEVEL_STEP_DB apart; the last is the cap itself."""
     below = np.arange(round(-LOWEST_DB / LEVEL_STEP_DB), -1, -1, dtype=np.float64)
     return cap_db - LEVEL_STEP_DB * below
 
@@ -73,7 +79,7 @@ def share_right(level_db: FloatArray, cap_db: float) -> FloatArray:
 
 
 def posterior(answered: tuple[Answered, ...], cap_db: float) -> FloatArray:
-    """Probability of every threshold and slope (thresholds, slopes), after a flat prior."""
+    """Posterior probability of every threshold and slope (thresholds, slopes), from a flat prior."""
     log_p = np.zeros((len(thresholds_db(cap_db)), len(SLOPES)))
     for level_db, right in answered:
         p = share_right(np.array(level_db), cap_db)

@@ -122,7 +122,7 @@ def practice_level_n(settings: PracticeSettings, seed: int, run: int, trial: int
     return _draw_level_n(settings.level_n, settings.rove_db, seed, (run, trial, attempt, _ROVE))
 
 
-def roved_level_n(nominal_n: float, rove_db: float, seed: int, run: int, trial: int, attempt: int) -> float:
+def rove_level_n(nominal_n: float, rove_db: float, seed: int, run: int, trial: int, attempt: int) -> float:
     """Amplitude (N) of a staircase trial around the level of its staircase, drawn independently of the direction."""
     return _draw_level_n(nominal_n, rove_db, seed, (run, trial, attempt, _ROVE))
 

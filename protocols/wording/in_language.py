@@ -54,7 +54,8 @@ def in_language(values: Mapping[str, Any], table: Mapping[str, str], name: str) 
 
 
 def _question(question: Any, translate: Callable[[Any], Any]) -> Any:
-    """What is logged of a choice does not change with the language."""
+    """The question with its texts translated. Choices keep the texts of the protocol as their codes, so that the same
+    answer is logged in every language."""
     if not isinstance(question, dict):
         return question
     asked = {key: _translate_each(value, translate) if key in ("question", "choices", "ends") else value

@@ -30,15 +30,15 @@ def export_controller(
     from study.workflows.equalizer.controller.export_controller import (
         ControllerPlan,
         controller_settings,
+        describe_export,
         export_controller,
-        exported_lines,
-        exported_summary,
-        exported_warnings,
+        summarise_export,
+        warn_of_export,
     )
 
     settings = controller_settings(weight, preview / 1000, cap)
     exported = export_controller(ControllerPlan(model, out, transient, settings))
-    for warning in exported_warnings(exported):
+    for warning in warn_of_export(exported):
         typer.echo(f"Note: {warning}", err=True)
-    found = exported_summary(exported)
-    typer.echo(json.dumps(found, indent=2) if as_json else "\n".join(exported_lines(exported)))
+    found = summarise_export(exported)
+    typer.echo(json.dumps(found, indent=2) if as_json else "\n".join(describe_export(exported)))

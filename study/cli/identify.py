@@ -62,11 +62,11 @@ def identify(
 
 
 def _band(band: tuple[float, float], limit_from: Path | None) -> tuple[float, float]:
-    """As stated, or up to the direction limit of a study."""
+    """The stated band, or with `limit_from` the same band up to the direction limit of that analysis."""
     if limit_from is None:
         return band
     from study.workflows.equalizer.direction_limit import band_of_study
 
     found = band_of_study(limit_from, band[0])
-    typer.echo(f"Note: {found.told}", err=True)
+    typer.echo(f"Note: {found.origin}", err=True)
     return found.band_hz

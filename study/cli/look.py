@@ -42,7 +42,7 @@ def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
     from study.tui.text_rows import wrap_hanging
 
     yield brief(found)
-    yield from recording_lines(found)
+    yield from draw_recording_lines(found)
     yield ""
     for check in found.checks:
         if everything or check.level != "fine":
@@ -53,7 +53,7 @@ def look_lines(found: "Overview", everything: bool) -> Iterable[str]:
     yield ""
 
 
-def recording_lines(found: "Overview") -> Iterable[str]:
+def draw_recording_lines(found: "Overview") -> Iterable[str]:
     """Time series, spectra, and tables of channels and segments."""
     from study.tui.drawing.recording_drawing import spectrum_lines, time_series_lines
 

@@ -105,9 +105,9 @@ def power(
 
 def _compare(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_json: bool) -> None:
     """Print what each rule makes of the same people. Their habits, and what they feel, are left out."""
-    from analysis.psychophysics.power.compare_rules import compare_rules, compared_rules
+    from analysis.psychophysics.power.compare_rules import compare_rules, list_compared_rules
 
-    results = compare_rules(crowd, compared_rules(rule), people, seed)
+    results = compare_rules(crowd, list_compared_rules(rule), people, seed)
     if as_json:
         typer.echo(json.dumps([asdict(result) for result in results], indent=2))
         return
@@ -126,7 +126,7 @@ def _compare(crowd: "Crowd", rule: "StaircaseRule", people: int, seed: int, as_j
 
 def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "Crowd":
     """People whose median threshold is the same at all frequencies but the first of the pair that is compared."""
-    from analysis.psychophysics.power.power_curve import judged_pair
+    from analysis.psychophysics.power.power_curve import find_judged_pair
     from analysis.psychophysics.power.simulated_study import Crowd
 
     frequencies_hz = tuple(sorted(protocol.stimulus.frequencies_hz))
@@ -137,7 +137,7 @@ def _crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float) -> "
             "Choose a protocol with two or more in stimulus.frequencies_hz.",
         )
     raised_n = threshold_n * 10.0 ** (effect_db / 20.0)
-    raised_hz, _ = judged_pair(frequencies_hz, protocol.analysis.contrast_hz)
+    raised_hz, _ = find_judged_pair(frequencies_hz, protocol.analysis.contrast_hz)
     return Crowd(frequencies_hz, tuple(raised_n if f == raised_hz else threshold_n for f in frequencies_hz))
 
 

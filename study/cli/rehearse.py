@@ -35,14 +35,14 @@ def rehearse(
     from study.workflows.results.analysis_files import ANALYSIS_NAME
     from study.workflows.results.analyze_data import analyze_data
     from study.workflows.session.equalize_stimuli import check_playable
-    from study.workflows.session.rehearse_study import Rehearsal, rehearse_study, rehearsed_observer
+    from study.workflows.session.rehearse_study import Rehearsal, make_rehearsed_observer, rehearse_study
 
     source = read_study_protocol(protocol_or_default(protocol, model), out)
     check_playable(source.protocol, model)
     rehearsal = Rehearsal(
         source.protocol, source.text, subjects, seed, data=out, model=model, observer=observer, locked=source.locked
     )
-    rehearsed_observer(rehearsal, 0)
+    make_rehearsed_observer(rehearsal, 0)
     with cluster_if(scheduler) as cluster, bar(f"{subjects} simulated participants", total=subjects) as advance:
         rehearse_study(rehearsal, cluster or workers, advance)
     show(analyze_data(out, out / ANALYSIS_NAME), as_json)

@@ -82,7 +82,7 @@ def _serve(command: list[str], host: str, port: int) -> None:
 
 
 def _study_options(context: typer.Context) -> list[str]:
-    """Read by `hapteq study` itself, so that a wrong one is told here and not in the browser."""
+    """Read by `hapteq study` itself, so that a wrong one is refused here and not in the browser."""
     group: Any = context.parent.command if context.parent is not None else None
     options = list(context.args)
     values = group.commands["study"].make_context("study", list(options), parent=context.parent).params

@@ -57,14 +57,14 @@ def show(
 
 
 def _show_recording(path: Path, as_json: bool) -> None:
-    from study.cli.look import recording_lines, say
-    from study.workflows.recording.look_at_recordings import look_at, look_document, recording_facts
+    from study.cli.look import draw_recording_lines, say
+    from study.workflows.recording.look_at_recordings import list_recording_facts, look_at, look_document
 
     found = look_at([path])
     if as_json:
         _print_lines([json.dumps(look_document(found)[0], indent=2)])
         return
-    say([*recording_facts(found[0]), *recording_lines(found[0]), "", f"Its checks: hapteq look {path}"])
+    say([*list_recording_facts(found[0]), *draw_recording_lines(found[0]), "", f"Its checks: hapteq look {path}"])
 
 
 def _folder(what: str, data: Path) -> Path:

@@ -28,9 +28,9 @@ def study_plan(
 
     Planned is what analysis.participants of the protocol declares.
     """
-    from study.workflows.views.plan_study import document, planned_studies
+    from study.workflows.views.plan_study import document, list_planned_studies
 
-    studies = planned_studies(data, protocol, simulated)
+    studies = list_planned_studies(data, protocol, simulated)
     if as_json:
         typer.echo(json.dumps(document(studies), indent=2))
         return

@@ -125,7 +125,7 @@ def _check_steps(steps: FloatArray, limits: Limits, rate_hz: float) -> None:
 
 
 def _check_info(info: DeviceInfo) -> None:
-    """What the spring, the fades and all times rest on."""
+    """Require properties of the device within their ranges: spring, fades and all times depend on them."""
     ranges = (
         ("sample_rate_hz", info.sample_rate_hz, *RATES_HZ),
         ("effective_mass_kg", info.effective_mass_kg, 1e-3, HEAVIEST_KG),

@@ -110,21 +110,22 @@ def _check_hand(name: str, info: DeviceInfo, settings: DeviceSettings) -> None:
     """Raises `DeviceError` where a hand is to hold what was not accepted, also where its driver is a lab's own and says
     that it is simulated: whether it is, the name decides."""
     if settings.hand_on_handle and (needs_real_time(name) or not info.simulated):
-        accepted_baseline(info, datetime.now(UTC).date())
+        find_accepted_baseline(info, datetime.now(UTC).date())
 
 
 @contextlib.contextmanager
 def linkage_of(name: str) -> "Iterator[LinkageSource]":
-    """What a device knows of its linkage. Nothing moves, and a real device stays braked. Raises `DeviceError`."""
+    """Source of a device's linkage: joint angles, Jacobian and inertia by position. Nothing moves, and a real device
+    stays braked. Raises `DeviceError`."""
     if name in REAL:
         from study.devices.force_dimension.linkage import vendor_linkage
 
         with vendor_linkage(name) as linkage:
             yield linkage
     elif name == SIMULATED:
-        from study.devices.simulated.own_linkage import simulated_linkage
+        from study.devices.simulated.own_linkage import make_simulated_linkage
 
-        yield simulated_linkage()
+        yield make_simulated_linkage()
     else:
         raise (
             _unknown_device(name)
@@ -183,7 +184,7 @@ def loop_priority() -> DeviceFinding:
 
 
 def examine_device(name: str) -> tuple[DeviceFinding, ...]:
-    """What a look at a real device's driver finds, with zero force; nothing for the others. Raises nothing."""
+    """Findings on a real device and its driver, with zero force; empty for other devices. Never raises."""
     if name not in REAL:
         return ()
     from study.devices.force_dimension.findings import examine
@@ -230,7 +231,7 @@ def device_folder() -> Path:
     return lab_file_path().parent
 
 
-def accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
+def find_accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
     """Name in `device_folder` and SHA-256 of the recording that was accepted; empty where none was made.
 
     Raises `DeviceError` where this device was not accepted.

@@ -16,17 +16,17 @@ from study.errors import DeviceError
 from study.store.formats.calibration_file import read_calibration
 
 
-def simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
+def make_simulated_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
     """The simulated omega.3. Raises `DeviceError` for a place where there is no workspace."""
     return _build_simulated(settings, seed, friction=True)
 
 
 def frictionless_rig(settings: DeviceSettings, seed: int) -> CompiledRig:
-    """As `simulated_rig`."""
+    """The simulated omega.3 without friction. Raises as `make_simulated_rig`."""
     return _build_simulated(settings, seed, friction=False)
 
 
-def calibrated_rig(path: Path, settings: DeviceSettings, seed: int) -> CompiledRig:
+def make_calibrated_rig(path: Path, settings: DeviceSettings, seed: int) -> CompiledRig:
     """The simulated device with the linkage and the inertia of a calibration. Raises `StudyError` for a file that
     cannot be used."""
     calibration = read_calibration(path)
@@ -53,12 +53,12 @@ def _build_simulated(
 
 
 def _real_rig(name: str, settings: DeviceSettings, seed: int) -> Rig:
-    """Nothing is random in it that a seed could drive."""
+    """The rig of a real device. The seed is not used: nothing in it is random."""
     return force_dimension_rig(name, settings)
 
 
 RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {
-    "simulated": simulated_rig,
+    "simulated": make_simulated_rig,
     "simulated-frictionless": frictionless_rig,
     **{name: partial(_real_rig, name) for name in MODELS},
 }
@@ -73,5 +73,5 @@ def find_rig(name: str, settings: DeviceSettings, seed: int) -> Rig | CompiledRi
 
         return replay_rig(Path(name.removeprefix(REPLAY)))
     if name.startswith(CALIBRATED):
-        return calibrated_rig(Path(name.removeprefix(CALIBRATED)), settings, seed)
+        return make_calibrated_rig(Path(name.removeprefix(CALIBRATED)), settings, seed)
     return RIGS_BY_NAME[name](settings, seed)

@@ -1,9 +1,12 @@
 """Telemetry ring: the readings and forces of each tick of a device's loop, in memory that other programs can read.
 
 One writer, the loop (`governor.telemetry_row`), any number of readers. The writer never waits and knows of no reader;
-a reader that comes too late is told how many rows it lost. The ring is a file in memory (Linux: /dev/shm; elsewhere
-the folder for temporary files), made and removed by the program that opened the device, so that nothing is left when
-the loop's process is killed.
+a reader that is too slow can see how many rows it lost. The ring is a file in memory (Linux: /dev/shm; elsewhere the
+folder for temporary files), made and removed by the program that opened the device, so that no file remains when the
+loop's process is killed.
+
+The first row is a header: format, rate, number of rows written so far. Row k of the loop is in row 1 + k mod size, with
+its own number k and a checksum: a reader recognises by them a row that is being overwritten.
 """
 
 import contextlib
@@ -23,26 +26,29 @@ from study.errors import StudyError
 from study.regular_file import open_regular
 
 ROWS = 16384
-"""16 s at 1 kHz: a reader may stand still for so long and loses nothing."""
+"""Rows of a ring: 16 s at 1 kHz, for which a reader may pause and loses nothing."""
 
 FORMAT = 2.0
-"""1: rows whose check was the exclusive or of their bits, which equal changes in two cells leave as it was."""
+"""Version of the rows. In version 1 the checksum was the exclusive or of the cells' bits, which does not detect equal
+changes in two cells."""
 PREFIX, SUFFIX = "hapteq-", ".ring"
+"""Beginning and end of a ring's file name."""
 ROW_BYTES = 8 * cells.RING_WIDTH
-"""A row of 64-bit floats."""
-LEFT_AFTER_S = 60.0
-"""A younger file may belong to a program that is just making it."""
+"""Size of a row, of 64-bit floats."""
+ABANDONED_AFTER_S = 60.0
+"""Least age (s) of a ring without a lock that is removed: a younger one may just be made by another program. By
+hand."""
 
 
 class Ring:
-    """path: "" makes a ring, which `remove` removes; else that of another program is used. Its `path` is empty where
-    the system gave no room: then nothing is written, and the device works all the same."""
+    """Writer's side of a ring. path: empty to make one, which `remove` removes; else the ring of another program. The
+    attribute `path` is empty where the system gave no memory: then nothing is written, and the device works without."""
 
     def __init__(self, path: str = "", rows: int = ROWS) -> None:
         self.path = path
         self._descriptor: int | None = None
         if not path:
-            _remove_left_ones()
+            _remove_abandoned_rings()
             with contextlib.suppress(OSError):
                 self._make(rows)
 
@@ -52,7 +58,7 @@ class Ring:
         if not self.path:
             return None
         try:
-            rows = _mapped(Path(self.path), mmap.ACCESS_WRITE)
+            rows = _map_rows(Path(self.path), mmap.ACCESS_WRITE)
         except (OSError, ValueError):
             return None
         rows[1:, cells.RING_INDEX] = -1.0
@@ -85,12 +91,12 @@ class Ring:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Telemetry:
-    """Ticks, oldest first. Each array has a row a tick."""
+    """Readings and forces of successive ticks, oldest first. Each array has a row per tick; vectors are (n, 3)."""
 
     time_s: FloatArray
-    """(n,) when the tick's reading was taken, on the session's monotonic clock."""
+    """(n,) time of the tick's reading on the session's monotonic clock."""
     tick: FloatArray
-    """(n,) of its stimulus: 0 is the first of it, below 0 the handle is brought to rest."""
+    """(n,) number of the tick in its stimulus, from 0; negative while the handle is brought to rest before it."""
     position_m: FloatArray
     velocity_m_per_s: FloatArray
     """Velocity as the damper uses it, low-passed at 50 Hz; NaN while the force is released."""
@@ -100,9 +106,9 @@ class Telemetry:
     applied_n: FloatArray
     """Force that was sent to the device: with spring, damper, slew limit and total cap."""
     phase: FloatArray
-    """(n,) 0 still, 1 playing, 2 being released, 3 let go by the safety layer."""
+    """(n,) 0: no force, 1: playing, 2: force being faded out, 3: force switched off by the safety layer."""
     fault: FloatArray
-    """(n,) place in `study.devices.device.Fault`; 0 = none."""
+    """(n,) index of `study.devices.device.Fault`; 0 = none."""
     missed: FloatArray
     """(n,) ticks of this stimulus that were missed so far."""
 
@@ -111,11 +117,11 @@ class Telemetry:
 
 
 class TelemetryReader:
-    """Reads from now on. Raises `StudyError` for what is no ring."""
+    """Reader's side of a ring, from the next row on. Raises `StudyError` for a file that is no ring."""
 
     def __init__(self, path: Path) -> None:
         try:
-            self._rows = _mapped(path, mmap.ACCESS_READ)
+            self._rows = _map_rows(path, mmap.ACCESS_READ)
         except (OSError, ValueError) as problem:
             raise StudyError(
                 "The device's loop cannot be followed",
@@ -128,14 +134,14 @@ class TelemetryReader:
         """Rows that were overwritten before they were read, since the beginning."""
 
     def read(self) -> Telemetry:
-        """The rows since the last call."""
+        """The rows since the last call. Rows that were overwritten before are counted in `lost`."""
         size = len(self._rows) - 1
         count = int(self._rows[0, cells.RING_COUNT])
         first = max(self._next, count - size)
         wanted = np.arange(first, count)
         rows = self._rows[1 + wanted % size]  # a copy
         good = _is_consistent(rows) & (rows[:, cells.RING_INDEX] == wanted)
-        # What was not seen whole was overwritten meanwhile, and is lost, or is too new, and waits for the next call.
+        # An inconsistent row was overwritten meanwhile, and is lost, or is being written, and is left to the next call.
         too_new = wanted[~good & (wanted > int(self._rows[0, cells.RING_COUNT]) - size)]
         if len(too_new):
             count = int(too_new[0])
@@ -146,34 +152,37 @@ class TelemetryReader:
 
 
 def _is_consistent(rows: FloatArray) -> np.ndarray:
+    """Mask (n,) of the rows whose checksum is right: sum of (bits ^ (bits >> RING_FOLD)) RING_FACTORS over the cells,
+    modulo 2^64."""
     bits = rows.view(np.int64)
     checked = bits[:, : cells.RING_CHECK]
     checks = np.sum((checked ^ (checked >> cells.RING_FOLD)) * cells.RING_FACTORS, axis=1)
-    whole: np.ndarray = checks == bits[:, cells.RING_CHECK]
-    return whole
+    consistent: np.ndarray = checks == bits[:, cells.RING_CHECK]
+    return consistent
 
 
 def _telemetry(rows: FloatArray) -> Telemetry:
-    def three(first: int) -> FloatArray:
+    def vector(first: int) -> FloatArray:
         return rows[:, first : first + 3]
 
     return Telemetry(
         time_s=rows[:, cells.RING_TIME_S],
         tick=rows[:, cells.RING_TICK],
-        position_m=three(cells.RING_POSITION),
-        velocity_m_per_s=three(cells.RING_VELOCITY),
-        acceleration_mps2=three(cells.RING_ACCELERATION),
-        commanded_n=three(cells.RING_COMMANDED),
-        applied_n=three(cells.RING_APPLIED),
+        position_m=vector(cells.RING_POSITION),
+        velocity_m_per_s=vector(cells.RING_VELOCITY),
+        acceleration_mps2=vector(cells.RING_ACCELERATION),
+        commanded_n=vector(cells.RING_COMMANDED),
+        applied_n=vector(cells.RING_APPLIED),
         phase=rows[:, cells.RING_PHASE],
         fault=rows[:, cells.RING_FAULT],
         missed=rows[:, cells.RING_MISSED],
     )
 
 
-def _mapped(path: Path, access: int) -> FloatArray:
-    """(1 + rows, RING_WIDTH). Raises OSError, ValueError."""
-    # To open a pipe for reading would wait for its writer.
+def _map_rows(path: Path, access: int) -> FloatArray:
+    """The file as an array (1 + rows, RING_WIDTH) in shared memory. Raises OSError, and ValueError for what is no
+    ring."""
+    # Only regular files: opening a pipe for reading would wait for its writer.
     with open_regular(path) if access == mmap.ACCESS_READ else path.open("r+b") as file:
         memory = mmap.mmap(file.fileno(), 0, access=access)
     if len(memory) < 2 * ROW_BYTES or len(memory) % ROW_BYTES:
@@ -190,7 +199,7 @@ def _folder() -> str:
 
 
 def _lock(descriptor: int) -> bool:
-    """False where another program has it. Where the system has no such locks, always True."""
+    """Lock the file. False where another program has the lock. Where the system has no such locks, always True."""
     if sys.platform == "win32":
         return True
     import fcntl
@@ -202,16 +211,17 @@ def _lock(descriptor: int) -> bool:
     return True
 
 
-def _remove_left_ones() -> None:
-    """Rings of programs that were killed. Never raises. Windows gives a file no lock here: there they stay."""
+def _remove_abandoned_rings() -> None:
+    """Remove the rings of programs that were killed: those without a lock. Never raises. On Windows, where a ring has
+    no lock, they remain."""
     if sys.platform == "win32":
         return
     for path in Path(_folder()).glob(f"{PREFIX}*{SUFFIX}"):
         with contextlib.suppress(OSError):
             descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
             try:
-                mine = os.fstat(descriptor).st_uid == os.getuid()
-                if mine and time.time() - os.fstat(descriptor).st_mtime > LEFT_AFTER_S and _lock(descriptor):
+                is_own = os.fstat(descriptor).st_uid == os.getuid()
+                if is_own and time.time() - os.fstat(descriptor).st_mtime > ABANDONED_AFTER_S and _lock(descriptor):
                     path.unlink()
             finally:
                 os.close(descriptor)

@@ -10,7 +10,7 @@ import numpy as np
 from analysis.diagnosis.data.found_segments import find_segments
 from analysis.look.clock import rate_objection
 from equalizer.signals.recording import Hold, Recording, Segment
-from equalizer.signals.recording_checks import recording_problems
+from equalizer.signals.recording_checks import check_recording
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit, quantity_of
 from study.importing.alignment import Logger, align_signals
@@ -87,7 +87,7 @@ def build_recording(
         recording, repeats = find_segments(_concatenate(wanted, parts, units))
     except ImportProblemError as error:
         raise ImportRefusedError(what, str(error)) from error
-    if problems := recording_problems(recording):
+    if problems := check_recording(recording):
         raise ImportRefusedError(what, "; ".join(problems))
     notes = import_notes.sentences([part.label for part in planned])
     return BuiltRecording(recording, (*notes, *_unit_remark(wanted), *filter(None, (_odd_rate(recording), repeats))))

@@ -208,11 +208,11 @@ def _uniform(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | None]:
             steps = np.diff(places)
             if uneven <= UNEVEN and (steps >= 1).all() and np.mean(steps > 1) <= LEFT_OUT:
                 return rate_hz, places
-    rate_hz = _rounded_rate(since_s, unit_s)
+    rate_hz = _estimate_rounded_rate(since_s, unit_s)
     return rate_hz, np.arange(len(stamps_s)) if rate_hz else None
 
 
-def _rounded_rate(since_s: Value, unit_s: float) -> float:
+def _estimate_rounded_rate(since_s: Value, unit_s: float) -> float:
     """Rate of stamps without a gap that are uniform up to rounding to their last decimal place; else 0.
 
     They must all lie within one unit of that place (rounding of two stamps). Among rates with nearly the residual of

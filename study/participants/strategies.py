@@ -24,7 +24,7 @@ class Alternator:
     name: str
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """By the number of answers before in the session."""
+        """1 after an even number of answers in the session, else 2."""
         _, delay = uniform(felt, seed, 2)
         return Reply(1 + felt.trials_before % 2, response_time_s(delay))
 

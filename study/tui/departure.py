@@ -12,7 +12,7 @@ from textual.app import App
 
 from study.errors import ExitCode
 
-LOOK_EVERY_S = 0.5
+POLL_EVERY_S = 0.5
 """Interval at which the terminal is looked at (s)."""
 LAST_RESORT_S = 10.0
 """Longer than the engine ever takes to end. Writing to a closed terminal may block forever."""
@@ -33,4 +33,4 @@ def leave_with_the_terminal(app: App[Any], leave: Callable[[], None]) -> None:
     terminal = sys.__stdin__
     if not app.is_headless and terminal is not None and terminal.isatty():
         # Without this, Textual's reading thread would spin on the end of the input for ever.
-        app.set_interval(LOOK_EVERY_S, lambda: None if os.isatty(terminal.fileno()) else depart())
+        app.set_interval(POLL_EVERY_S, lambda: None if os.isatty(terminal.fileno()) else depart())

@@ -54,7 +54,7 @@ def felt_so_far(menu: DemoMenu, vibration: int, words: Words = ENGLISH_WORDS) ->
 
 
 def void_words(reason: str, words: Words = ENGLISH_WORDS) -> str:
-    """After a trial was cut short."""
+    """Text for the participant after a void trial."""
     if computer_too_busy(reason):
         return words["void_busy"]
     if reason == SCREEN_SILENT:

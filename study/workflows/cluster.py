@@ -79,8 +79,8 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
 
 @contextmanager
 def _executor(client: "Client") -> Iterator[Executor]:
-    """Of the client. What is not finished on leaving is cancelled: the executor's own end waits for it, and for what
-    was finished and is made anew because its worker died."""
+    """Executor of the client. Unfinished tasks are cancelled on exit: the executor's own exit would wait for them, and
+    for finished ones that are computed again because their worker died."""
     executor = client.get_executor(pure=False)
     try:
         yield executor

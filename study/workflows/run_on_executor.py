@@ -17,7 +17,7 @@ _FREED_BYTES = 30 * 2**20
 """Size of the block that is allocated and freed: below the 32 MB up to which glibc raises its limit."""
 
 
-def finished_pieces(
+def run_pieces(
     executor: Executor,
     function: Callable[..., Result],
     pieces: Iterable[tuple[Key, tuple[Any, ...]]],

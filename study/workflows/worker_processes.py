@@ -20,7 +20,7 @@ def worker_processes(workers: int) -> Iterator[ProcessPoolExecutor]:
     except BrokenProcessPool as died:
         raise StudyError(
             "A worker process was killed",
-            "It ended without a word: from outside, or by the system for want of memory.",
+            "It ended without an error of its own: it was killed, or the system lacked memory.",
             "Run the same command again: it goes on where it stopped. Where memory is short, use fewer --workers.",
             saved="What was finished is kept.",
         ) from died

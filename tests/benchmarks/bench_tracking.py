@@ -13,7 +13,7 @@ from numba import njit
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.tracking.lqr import lqr_kernel
-from equalizer.tracking.lqr.changing_direction import TurningTransient, turning_transient
+from equalizer.tracking.lqr.changing_direction import TurningTransient, make_rotatable_transient
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.riccati import backward_gains
 from equalizer.tracking.lqr.rotation import normal_basis, rotation_basis
@@ -131,7 +131,7 @@ def tick_times_ns(transient: TurningTransient) -> np.ndarray:
 def ticks() -> bool:
     problem = problem_of(ORDER)
     gains = stored_gains(problem, SAMPLES)
-    taken = tick_times_ns(turning_transient(gains, np.random.default_rng(0).standard_normal((SAMPLES, 3)))) / 1e3
+    taken = tick_times_ns(make_rotatable_transient(gains, np.random.default_rng(0).standard_normal((SAMPLES, 3)))) / 1e3
     shares = ", ".join(f"{share:g} % {np.percentile(taken, share):.3f}" for share in (50, 90, 99, 99.9, 99.99))
     over = int((taken > ALLOWED_TICK_US).sum())
     report(f"a tick whose direction turns, {TICKS} in a row [us]: {shares}, worst {taken.max():.3f}")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.signals.joining import join
-from equalizer.signals.recording import Recording, Segment
+from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import Signal
 
 
@@ -40,3 +40,9 @@ def test_nothing_cannot_be_joined():
 def test_recordings_of_two_devices_cannot_be_joined():
     with pytest.raises(ValueError, match="of another at 1000 Hz cannot follow one of a device"):
         join([part(4, 1.0), replace(part(4, 1.0), device="another")], {})
+
+
+def test_recordings_whose_commands_are_held_differently_cannot_be_joined():
+    """The joined recording has a single hold: a model would be fitted to a command that one part did not have."""
+    with pytest.raises(ValueError, match="command held by linear cannot follow one held by zero-order"):
+        join([part(4, 1.0), replace(part(4, 1.0), hold=Hold.LINEAR)], {})

@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 from scipy.signal import periodogram
 
-from equalizer.signals.masking_noise import FULL_SCALE, HEADROOM_DB, SLOPE_DB_PER_OCTAVE, masking_noise
+from equalizer.signals.masking_noise import FULL_SCALE, HEADROOM_DB, SLOPE_DB_PER_OCTAVE, make_masking_noise
 
 RATE_HZ = 44_100
 
 
 @pytest.fixture(scope="module")
 def noise():
-    return masking_noise(10, 40.0, 8000.0, seed=1)
+    return make_masking_noise(10, 40.0, 8000.0, seed=1)
 
 
 @pytest.fixture(scope="module")
@@ -69,8 +69,8 @@ def test_the_values_are_those_of_noise_and_not_of_a_click(noise):
 
 
 def test_a_seed_is_a_noise(noise):
-    assert np.array_equal(masking_noise(10, 40.0, 8000.0, seed=1), noise)
-    other = masking_noise(10, 40.0, 8000.0, seed=2).astype(np.float64)
+    assert np.array_equal(make_masking_noise(10, 40.0, 8000.0, seed=1), noise)
+    other = make_masking_noise(10, 40.0, 8000.0, seed=2).astype(np.float64)
     assert abs(np.corrcoef(other, noise)[0, 1]) < 0.05
 
 
@@ -86,4 +86,4 @@ def test_a_seed_is_a_noise(noise):
 )
 def test_noise_that_cannot_be_is_refused_with_its_numbers(seconds, low_hz, high_hz, problem):
     with pytest.raises(ValueError, match=problem):
-        masking_noise(seconds, low_hz, high_hz, seed=1)
+        make_masking_noise(seconds, low_hz, high_hz, seed=1)

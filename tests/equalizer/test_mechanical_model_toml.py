@@ -160,7 +160,7 @@ LAW = '[[effect]]\nkind = "discovered_law"\naxis = "x"\nacts_on = "force"\nexpre
         ('"-2.0*vx**3"', "3", "effect 1: discovered_law lacks expression (texts)"),
         ('axis = "x"\n', "", "effect 1: discovered_law lacks axis (texts)"),
         ('"force"', '"motion"', "effect 1: a law acts on force, command, response; not on 'motion'"),
-        ("acts_on", "gain = 2\nacts_on", "discovered_law has its numbers in its expression; beside it stands gain"),
+        ("acts_on", "gain = 2\nacts_on", "discovered_law has its parameters in its expression; it also gives gain"),
         ('"discovered_law"', '"discoverd_law"', "effect 1 holds acts_on = 'force', expression = '-2.0*vx**3'"),
     ],
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.recording_checks import recording_problems
+from equalizer.signals.recording_checks import check_recording
 from equalizer.signals.signal import Signal
 
 
@@ -18,19 +18,19 @@ def recording():
 
 
 def the_problem(recording):
-    (problem,) = recording_problems(recording)
+    (problem,) = check_recording(recording)
     return problem
 
 
 def test_a_consistent_recording_has_no_problems(recording):
-    assert recording_problems(recording) == ()
+    assert check_recording(recording) == ()
 
 
 def test_missing_samples_are_no_problem(recording):
     samples = np.zeros((100, 2))
     samples[7, 1] = np.nan
     gappy = replace(recording, response=Signal(samples, 1000.0, "position", "m", ("x", "y")))
-    assert recording_problems(gappy) == ()
+    assert check_recording(gappy) == ()
 
 
 def test_an_infinite_value_is_no_missing_sample(recording):
@@ -84,7 +84,7 @@ def test_overlapping_segments_are_named_in_any_order(recording):
     assert the_problem(replace(recording, segments=segments)) == (
         "segments 2 and 1 overlap (one stops at 51, the other starts at 50)"
     )
-    assert recording_problems(replace(recording, segments=(segments[0], Segment(10, 50, "sweep")))) == ()
+    assert check_recording(replace(recording, segments=(segments[0], Segment(10, 50, "sweep")))) == ()
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from protocols.definition.preparation import DemoSettings, PracticeSettings
 from protocols.document.hashing import protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
-from protocols.procedure.schedule import demo_level_n, draw_trial, practice_level_n, roved_level_n
+from protocols.procedure.schedule import demo_level_n, draw_trial, practice_level_n, rove_level_n
 from protocols.procedure.staircase import to_db
 
 ROVED = PracticeSettings(frequencies_hz=(25.0,), level_n=2.0, rove_db=6.0)
@@ -79,12 +79,12 @@ def shipped(request):
 
 def test_staircase_trials_are_roved_around_the_staircases_level_for_both_directions_alike(small_protocol):
     places = [(seed, trial) for seed in range(40) for trial in range(50)]
-    levels = np.array([to_db(roved_level_n(1.2, 6.0, seed, 2, trial, 0) / 1.2) for seed, trial in places])
+    levels = np.array([to_db(rove_level_n(1.2, 6.0, seed, 2, trial, 0) / 1.2) for seed, trial in places])
     sides = [draw_trial(small_protocol.schedule, "random", seed, 2, trial, 0).direction for seed, trial in places]
     assert -3.0 <= levels.min() < -2.9 and 2.9 < levels.max() <= 3.0
     assert abs(np.corrcoef(levels, sides)[0, 1]) < 4 / np.sqrt(len(levels))
-    assert roved_level_n(1.2, 0.0, 7, 2, 3, 0) == 1.2
-    assert len({roved_level_n(1.2, 6.0, 7, 2, 3, attempt) for attempt in range(5)}) == 5
+    assert rove_level_n(1.2, 0.0, 7, 2, 3, 0) == 1.2
+    assert len({rove_level_n(1.2, 6.0, 7, 2, 3, attempt) for attempt in range(5)}) == 5
 
 
 def roved(text, rove_db, cap_n):

@@ -206,7 +206,7 @@ def _replace_motion_laws(turned: InverseBalance, kinds: Kinds, named: tuple[int,
 def _scale_to_command(law: CommandLaw, regression: Regression) -> CommandLaw:
     motions, own = regression.motions, regression.beside.own
     command = np.concatenate([motion.force[motion.fit, regression.axis] for motion in motions])
-    return law.scaled_to(command, np.concatenate([motion.position[motion.fit, own] for motion in motions]))
+    return law.scale_to(command, np.concatenate([motion.position[motion.fit, own] for motion in motions]))
 
 
 def _sums_to_try(search: StructureSearch) -> list[tuple[int, ...]]:
@@ -224,7 +224,7 @@ def _best_of_each(
         if law.effect not in best or error < best[law.effect][0]:
             best[law.effect] = error, law
     moved = cast(
-        list[tuple[float, dict[str, float]]], list(turned.map_(partial(_refined_values, turned, beside), best.values()))
+        list[tuple[float, dict[str, float]]], list(turned.map_(partial(_refine_values, turned, beside), best.values()))
     )
     refined = [
         (error, replace(law, values=values)) for (_, law), (error, values) in zip(best.values(), moved, strict=True)
@@ -235,7 +235,7 @@ def _best_of_each(
     ]
 
 
-def _refined_values(
+def _refine_values(
     turned: InverseBalance, beside: tuple[int, ...], found: tuple[float, CommandLaw]
 ) -> tuple[float, dict[str, float]]:
     """Error and parameters of a law after a coordinate search over its parameters."""
@@ -279,7 +279,7 @@ def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -
             f"in the command's place it takes {100 * max(gain, 0.0):.0f} % of what laws of the motion leave, not most"
         )
     # A curve of the command and a force that changes with the distance are different physics.
-    strange = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
-    if strange or len(alike) >= LARGEST_CLASS:
+    different = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
+    if different or len(alike) >= LARGEST_CLASS:
         return f"these data cannot tell it from {', '.join(alike)}"
     return "" if law.effect in EFFECTS_BY_NAME or law.formula else "no simulation of ours plays it yet"

@@ -11,7 +11,7 @@ from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.linear_part import driven_motion, search_beside_linear
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motion_band_hz, motions_of
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, SECOND_BAND_NARROWER, STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -25,7 +25,7 @@ def find_balances(
     the band that noise allows, the narrower band in which the device moves is tried: content of the command above it
     hides laws."""
     try:
-        records = observed_parts(recordings, len(recordings[0].response.channels))
+        records = observe_parts(recordings, len(recordings[0].response.channels))
         motions = motions_of(records)
         found = _balances_per_axis(motions, recordings, without, time_left, map_)
     except (NoMotionError, np.linalg.LinAlgError):

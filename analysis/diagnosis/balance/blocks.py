@@ -75,7 +75,7 @@ def products_per_block(blocks: Sequence[Block], columns: Sequence[int]) -> tuple
     return grams, np.array([block.cross[at] for block in blocks]).reshape(-1, len(at))
 
 
-def summed_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+def sum_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     """Gram matrix (k, k) and cross products (k,) of k chosen columns, summed over the blocks."""
     grams, crosses = products_per_block(blocks, columns)
     return np.asarray(grams.sum(axis=0)), np.asarray(crosses.sum(axis=0))
@@ -116,14 +116,16 @@ def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[F
     return gram, cross
 
 
-def squared_error(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
+def compute_squared_error(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
     """Residual sum of squares of given weights, at least 0. own: Gram matrix and cross products; power: sum of squares
     of what is fitted."""
     gram, cross = own
     return max(power - 2 * float(weights @ cross) + float(weights @ gram @ weights), 0.0)
 
 
-def squared_errors(blocks: Sequence[Block], own: tuple[FloatArray, FloatArray], weights: FloatArray) -> FloatArray:
+def compute_squared_errors(
+    blocks: Sequence[Block], own: tuple[FloatArray, FloatArray], weights: FloatArray
+) -> FloatArray:
     """(blocks,): residual sums of squares. own: `products_per_block` of these blocks. weights: (c,), or (blocks, c)."""
     weights = np.broadcast_to(weights, own[1].shape)
     power = np.array([block.power for block in blocks])

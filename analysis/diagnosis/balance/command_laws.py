@@ -71,7 +71,7 @@ class CommandLaw:
         columns = self.scale * self.columns(command, self.values)
         return columns if self.factor_at is None else columns * self.factor_at(position, self.values)[:, None]
 
-    def scaled_to(self, command: FloatArray, position: FloatArray) -> "CommandLaw":
+    def scale_to(self, command: FloatArray, position: FloatArray) -> "CommandLaw":
         """The law with its force as large as the command (least squares), where it has a formula: masses keep their
         size then. command, position: (n,) each."""
         if self.formula is None:
@@ -114,13 +114,13 @@ def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[Comman
     fastest = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in commands) * rate_hz
     slowest = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(each) for each in commands)
     for rate in np.geomspace(slowest, fastest, RATES)[:-1] if 0 < slowest < fastest else ():
-        law = CommandLaw("slew_limit", {"rate": float(rate)}, partial(_slewed_force, 1 / rate_hz))
+        law = CommandLaw("slew_limit", {"rate": float(rate)}, partial(_compute_slewed_force, 1 / rate_hz))
         reached = [np.abs(law.columns(each, law.values)[:, 0] - each) < rate / rate_hz for each in commands]
         if np.mean(np.concatenate(reached)) > SLEW_REACHED:
             yield law
 
 
-def _slewed_force(step_s: float, command: FloatArray, of: dict[str, float]) -> FloatArray:
+def _compute_slewed_force(step_s: float, command: FloatArray, of: dict[str, float]) -> FloatArray:
     # A servo stands at its first target when the recording begins.
     return limit_slew(command, step_s, of["rate"], float(command[0]))[:, None]
 

@@ -50,7 +50,7 @@ def friction_laws(c: int, of: Scales) -> Iterator[Law]:
     values on grids of its speed and travel."""
     sharp = SHARP * of.speed
     # Stribeck velocities beyond these bounds, half the rms speed, stay as on their grid: there the law can hardly be
-    # told from Coulomb friction with quadratic damping, and refining it gains nothing.
+    # distinguished from Coulomb friction with quadratic damping, and refining it gains nothing.
     widths_of_sign, spans = friction_widths(of)
     for width in widths_of_sign:
         yield Law(
@@ -63,11 +63,11 @@ def friction_laws(c: int, of: Scales) -> Iterator[Law]:
     for width in widths:
         yield Law(
             "presliding_hysteresis", c, (float(width),), lambda m, n: bristle_bend(m.position[:, c], n[0])[:, None],
-            _presliding_values, bounded=((0.1 * widths[0], widths[-1]),),
+            _read_presliding_values, bounded=((0.1 * widths[0], widths[-1]),),
         )  # fmt: skip
     yield Law("asymmetric_friction", c, (), _asymmetric_columns(c, sharp), _asymmetric_values)
     if np.isfinite(of.band_hz):
-        yield Law("drifting_friction", c, (), _drifting_columns(c, sharp), _drifting_values)
+        yield Law("drifting_friction", c, (), _make_drifting_columns(c, sharp), _read_drifting_values)
     if not of.turns:
         yield Law(
             "position_dependent_friction", c, (), _position_dependent_columns(c, sharp), _position_dependent_values
@@ -88,7 +88,7 @@ def _stribeck_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float]
     return {"coulomb": float(w[0]), "static": float(w[0] + w[1]), "speed": n[0]}
 
 
-def _presliding_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+def _read_presliding_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
     return {"level": float(w[0]), "stiffness": float(w[0] / n[0])} if w[0] > 0 else None
 
 
@@ -105,7 +105,7 @@ def _asymmetric_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, floa
     return {"level_positive": float(w[0]), "level_negative": float(w[1])} if w.min() > 0 else None
 
 
-def _drifting_columns(c: int, sharp: float) -> Columns:
+def _make_drifting_columns(c: int, sharp: float) -> Columns:
     def columns(m: Motion, _: Numbers) -> FloatArray:
         sign = smooth_sign(m.velocity[:, [c]], sharp)
         return np.hstack([sign, sign * relative_time(m)])
@@ -113,8 +113,9 @@ def _drifting_columns(c: int, sharp: float) -> Columns:
     return columns
 
 
-def _drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-    """None where the friction would be negative somewhere in the part, and drive the motion."""
+def _read_drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    """Level and change from the weights w; None where the friction would be negative somewhere in the part, and drive
+    the motion."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > abs(w[1]) else None
 
 
@@ -127,8 +128,8 @@ def _position_dependent_columns(c: int, sharp: float) -> Columns:
 
 
 def _position_dependent_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
-    """None where the friction would be negative at q = 0. Elsewhere the effect holds it at zero where the parabola is
-    negative."""
+    """Level, slope and curvature from the weights w; None where the friction would be negative at q = 0. Elsewhere the
+    effect holds it at zero where the parabola is negative."""
     if w[0] <= 0:
         return None
     return {"level": float(w[0]), "slope_per_m": float(w[1] / w[0]), "bend_per_m2": float(w[2] / w[0])}

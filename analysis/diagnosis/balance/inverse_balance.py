@@ -18,9 +18,9 @@ from analysis.diagnosis.balance.blocks import (
     block_products,
     blocks_of,
     column_scale,
+    compute_squared_error,
     solve_normal_equations,
-    squared_error,
-    summed_products,
+    sum_products,
 )
 from analysis.diagnosis.balance.command_laws import CommandLaw
 from analysis.diagnosis.balance.judge_laws import blocks_to_judge
@@ -73,23 +73,27 @@ class InverseBalance:
         """Sum of squares on the fitted samples: a lower bound for each law that this sum approximates."""
         fit, _ = self._blocks(self._rows(law, beside), False)
         products = [block_products(block, range(len(fit[0].cross))) for block in fit]
-        weights = solve_normal_equations(summed_products(fit, range(len(fit[0].cross))), RIDGE)
-        return sum(squared_error(own, weights, block.power) for own, block in zip(products, fit, strict=True))
+        weights = solve_normal_equations(sum_products(fit, range(len(fit[0].cross))), RIDGE)
+        return sum(compute_squared_error(own, weights, block.power) for own, block in zip(products, fit, strict=True))
 
     def errors(self, law: CommandLaw, laws: Sequence[int], judged: bool) -> FloatArray:
         """(blocks,): sums of squares. judged: on the held-out blocks; else on each fold."""
         tested = judged and blocks_to_judge(self.search.regression) is self.search.regression.test
         fit, test = self._blocks(self._rows(law, laws), tested)
         columns = list(range(len(fit[0].cross)))
-        whole = summed_products(fit, columns)
+        whole = sum_products(fit, columns)
         if tested:
             weights = solve_normal_equations(whole, RIDGE)
-            return np.array([squared_error(block_products(block, columns), weights, block.power) for block in test])
+            return np.array(
+                [compute_squared_error(block_products(block, columns), weights, block.power) for block in test]
+            )
         found = []
         for block in fit:
             own = block_products(block, columns)
             found.append(
-                squared_error(own, solve_normal_equations((whole[0] - own[0], whole[1] - own[1]), RIDGE), block.power)
+                compute_squared_error(
+                    own, solve_normal_equations((whole[0] - own[0], whole[1] - own[1]), RIDGE), block.power
+                )
             )
         return np.array(found)
 

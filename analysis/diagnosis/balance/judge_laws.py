@@ -259,10 +259,10 @@ def _why_not(
             f"with it, {100 * (1 - explained):.0f} % of what all laws together take are left: the main part is another"
         )
     family = family_of(law.effect) | (BY_CONDITION if law.effect in BY_CONDITION else set())
-    strange = [effect for effect in alike if effect not in family]
+    of_other_family = [effect for effect in alike if effect not in family]
     others = [effect for effect in alike if law.effect not in special_cases(effect)]
-    if strange or (len(others) >= LARGEST_CLASS and not {law.effect, *others} <= DRY_FRICTIONS):
-        return f"these data cannot tell it from {', '.join(strange or alike)}"
+    if of_other_family or (len(others) >= LARGEST_CLASS and not {law.effect, *others} <= DRY_FRICTIONS):
+        return f"these data cannot tell it from {', '.join(of_other_family or alike)}"
     played = law.formula is not None or not {law.effect, PLAYED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
     return "" if played else "no simulation of ours plays it yet"
 

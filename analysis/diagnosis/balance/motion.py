@@ -123,7 +123,7 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
     if band_hz is None:
         band_hz = np.inf if untimed else band_end_hz(filled, rate_hz, order)
     lowest_hz = band_begin_hz(filled, rate_hz) if order == 2 and not untimed else 0.0
-    known, conditions = _standardised_conditions(records)
+    known, conditions = _standardise_conditions(records)
     return tuple(
         replace(_motion(record, (samples, order), (band_hz, lowest_hz), condition, moved[0].channels), conditions=known)
         for record, samples, condition in zip(records, filled, conditions, strict=True)
@@ -243,7 +243,7 @@ def _end_to_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, F
     return np.asarray(line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
 
 
-def _standardised_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:
+def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:
     """The conditions that change, and their standardised samples, (n, q) per record."""
     signals = [getattr(record.recording, "condition", None) for record in records]
     if len({None if signal is None else signal.channels for signal in signals}) > 1 or signals[0] is None:

@@ -18,12 +18,12 @@ from analysis.diagnosis.balance.blocks import (
     Prior,
     blocks_of,
     column_scale,
+    compute_squared_errors,
     products_per_block,
     solve_normal_equations,
     solve_ridge,
     solve_without_columns,
-    squared_errors,
-    summed_products,
+    sum_products,
     with_prior,
 )
 from analysis.diagnosis.balance.law import BaseTerms, Law
@@ -73,20 +73,20 @@ class Regression:
 
     def weights(self, columns: Sequence[int]) -> FloatArray:
         """(len(columns),): weights fitted to all fit blocks, in the columns' own units."""
-        return np.asarray(self._solve_nonnegative(summed_products(self.fit, columns)) / self.scale[list(columns)])
+        return np.asarray(self._solve_nonnegative(sum_products(self.fit, columns)) / self.scale[list(columns)])
 
     def cross_validated_errors(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): each fit block's sum of squares with weights fitted to the other blocks (leave one block out)."""
         own = products_per_block(self.fit, columns)
         weights = self._solve_nonnegative((own[0].sum(axis=0) - own[0], own[1].sum(axis=0) - own[1]))
-        return squared_errors(self.fit, own, weights)
+        return compute_squared_errors(self.fit, own, weights)
 
     def held_out_errors(self, columns: Sequence[int]) -> FloatArray:
         """(blocks,): each test block's sum of squares."""
-        return squared_errors(
+        return compute_squared_errors(
             self.test,
             products_per_block(self.test, columns),
-            self._solve_nonnegative(summed_products(self.fit, columns)),
+            self._solve_nonnegative(sum_products(self.fit, columns)),
         )
 
     def _solve_nonnegative(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
@@ -268,7 +268,9 @@ def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float,
     whole = own[0].sum(axis=0), own[1].sum(axis=0)
     rest = with_prior((whole[0] - own[0], whole[1] - own[1]), regression.prior)
     whole = with_prior(whole, regression.prior)
-    errors = [float(squared_errors(regression.fit, own, solve_ridge(rest, ridge, free)).sum()) for ridge in RIDGES]
+    errors = [
+        float(compute_squared_errors(regression.fit, own, solve_ridge(rest, ridge, free)).sum()) for ridge in RIDGES
+    ]
     best = int(np.argmin(errors))
     found = solve_ridge(whole, RIDGES[best], free)
-    return errors[best], squared_errors(regression.test, products_per_block(regression.test, columns), found)
+    return errors[best], compute_squared_errors(regression.test, products_per_block(regression.test, columns), found)

@@ -17,10 +17,10 @@ from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.forces.inverse_dynamics import band_motion, required_force
+from analysis.diagnosis.forces.inverse_dynamics import band_motion, compute_required_force
 from analysis.diagnosis.settings import LAW_OF_SIGNAL, MOTION_OVERSAMPLED
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
@@ -42,7 +42,7 @@ def find_balances_beside_model(
     recordings: Sequence[Recording], model: MechanicalModel, without: frozenset[str], time_left: TimeBudget
 ) -> tuple[Balance, ...]:
     """One balance per command; empty where not each command drives a measured position or velocity."""
-    records = observed_parts(recordings, model.outputs)
+    records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
         return ()
     try:
@@ -83,7 +83,7 @@ def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
     known = effects_under_conditions(place_recorded_effects(model, recording), recording)
     at = _structure(add_carried_weight(model, recording), known)
-    whole = required_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
+    whole = compute_required_force(at, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     motion_of_axis = whole.axis_position, whole.axis_velocity, whole.axis_acceleration
     entered = actuator_force(model, motion.force, rate_hz, known, recording.hold)
     added = force_along(at, known, motion_of_axis, (motion.force, entered - whole.force), rate_hz)
@@ -95,12 +95,12 @@ def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _
         force=motion.band_pass(entered + added)[::every], condition=motion.condition[::every],
         fit=motion.fit[::every], test=motion.test[::every],
     )  # fmt: skip
-    changes = [*_grounded_columns(thin, model, recording), *_mode_columns(thin, model, recording, known)]
+    changes = [*_make_grounded_columns(thin, model, recording), *_mode_columns(thin, model, recording, known)]
     columns = np.stack([whole.force[::every], *changes], axis=1)
     return _BalanceData(thin, tuple(columns[:, :, axis] for axis in range(m)))
 
 
-def _grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
+def _make_grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
     """(n, m) each: force of one standard deviation of mass, damping and stiffness at the driven axes, in the order of
     `Tuning`."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
@@ -117,7 +117,7 @@ def _grounded_columns(motion: Motion, model: MechanicalModel, recording: Recordi
 def _mode_columns(
     motion: Motion, model: MechanicalModel, recording: Recording, known: Sequence[PlacedEffect]
 ) -> Iterator[FloatArray]:
-    """(n, m) each: force of one standard deviation of each number of the modes."""
+    """(n, m) each: force of one standard deviation of each parameter of the modes."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
     first = 3 * m * (m + 1) // 2
     if first == len(tuning.names):
@@ -126,7 +126,7 @@ def _mode_columns(
     moved = band_motion(seen, motion.rate_hz, motion.band_hz)
     steps = DIFFERENCE_STEP * np.eye(len(tuning.names))[first:]
     here, *there = (
-        required_force(_structure(add_carried_weight(tuning.tune(step), recording), known), moved).force
+        compute_required_force(_structure(add_carried_weight(tuning.tune(step), recording), known), moved).force
         for step in (0 * steps[0], *steps)
     )
     yield from ((each - here) / DIFFERENCE_STEP for each in there)

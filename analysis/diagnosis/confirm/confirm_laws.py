@@ -42,9 +42,8 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import final_errors
-from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.verdict import Judgement, as_good_as_noise
+from analysis.diagnosis.search.verdict import Judgement, SearchResult, as_good_as_noise
 from analysis.diagnosis.settings import CONFIRMED_LEAVES, HELD_OUT_ERROR, INTERVAL_FACTOR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.signals.signal import FloatArray

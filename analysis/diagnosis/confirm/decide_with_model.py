@@ -19,16 +19,13 @@ from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, held_out_gain
 from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.parsimony import only_refines
-from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import Judgement, SearchResult, Unconfirmed
 from analysis.diagnosis.settings import (
-    AT_RETUNING_BOUND,
     CANDIDATES_WITH_GAIN,
     FURTHER_LAW_OF_ALL,
     NAMED_ERROR,
     NAMED_OF_CEILING,
-    RETUNING_BOUND,
 )
 from analysis.diagnosis.types import TimeBudget
 from equalizer.signals.recording import Recording
@@ -56,7 +53,7 @@ def decide_with_model(
     if known_noise and near_noise:
         why_not = "the noise is known here, and what it leaves is more than noise"
         return ResultWithModel(
-            replace(result, unconfirmed=(*result.unconfirmed, *_unconfirmed_candidates(result, why_not))), balances
+            replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, why_not))), balances
         )
     why_not = objection(result, balances)
     if result.found.steps and not why_not:
@@ -66,7 +63,7 @@ def decide_with_model(
         judged = replace(found.judgement, verdict="partly_explained")
         return ResultWithModel(replace(found, judgement=judged, remarks=result.remarks), balances)
     return ResultWithModel(
-        replace(result, unconfirmed=(*result.unconfirmed, *_unconfirmed_candidates(result, why_not))), balances
+        replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, why_not))), balances
     )
 
 
@@ -84,7 +81,7 @@ def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
         return "its gain on held-out data is not larger than what varies between stretches"
     if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
         return f"on held-out data it takes {100 * min(whole.gain, last.gain):.0f} % of the error's power, not a third"
-    if np.any(np.abs(found.after.fitted.deviations) >= AT_RETUNING_BOUND * RETUNING_BOUND):
+    if context.tuning.is_at_bound(found.after.fitted.deviations):
         return "beside it, a parameter of the model stands at the end of its tolerance"
     rival = _best_rival(context, result)
     if rival is not None and _not_better(context, rival, found.after):
@@ -126,7 +123,7 @@ def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
     return claim.effect.name in names
 
 
-def _unconfirmed_candidates(result: SearchResult, why_not: str) -> tuple[Unconfirmed, ...]:
+def _list_unconfirmed(result: SearchResult, why_not: str) -> tuple[Unconfirmed, ...]:
     """The best candidates of the round in which the search ended, the largest gain first."""
     rounds = [fitted_candidates for fitted_candidates in result.found.rounds if fitted_candidates]
     if not rounds:

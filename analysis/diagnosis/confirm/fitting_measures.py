@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, measure_of
 from analysis.diagnosis.errors.fit_score import fit_score
 from analysis.diagnosis.errors.hypothesis import NOTHING
@@ -114,7 +114,7 @@ def add_to_commands(recordings: Sequence[Recording], constant: FloatArray) -> tu
 
 def _means(recordings: Sequence[Recording], responses: int) -> tuple[FloatArray, FloatArray]:
     """Means of commands (m,) and responses (p,) over the samples to fit and to choose by."""
-    records = observed_parts(recordings, responses)
+    records = observe_parts(recordings, responses)
     masks = [record.fit | record.choose for record in records]
     pushed = np.vstack([record.command[mask] for record, mask in zip(records, masks, strict=True)])
     stood = np.vstack([record.recording.response.samples[mask] for record, mask in zip(records, masks, strict=True)])

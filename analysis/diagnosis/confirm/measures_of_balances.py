@@ -34,7 +34,7 @@ def list_fitting_measures(
 
     First a free simulation, or windows of one, where the fitted model allows it. Then forces along the measured motion
     with the balances' linear parameters: in the band where noise is small, if that holds most of the laws' power, and
-    in the band of the balances. compared: what the user wants compared, which leaves out the others.
+    in the band of the balances. compared: "motion" or "force" where the user wants only that compared.
     """
     if not any(balance.named for balance in balances):
         return
@@ -61,13 +61,13 @@ def list_fitting_measures(
         return  # the balances' parameters make no model, or none that can be inverted: nothing more can be tried
 
 
-def choose_plain_forces(
+def choose_forces_of_balance(
     recordings: Sequence[Recording], fitting: FittingMeasure, balances: Sequence[Balance]
 ) -> FittingMeasure:
     """The measure with the balances' own linear parameters, where forces are compared, no law is named, and these leave
-    less of the forces than the fitted model, on the samples to fit and to choose by; else `fitting` as it is. A model
-    that was fitted to spectra in closed loop may need modes that the measured motions of a second body make
-    unnecessary."""
+    less of the forces than the fitted model, on the samples to fit and to choose by; else `fitting` unchanged. A model
+    fitted to spectra in closed loop may need modes that are unnecessary where the motion of a second body is
+    measured."""
     given = fitting.chosen.measure
     named, first = any(balance.named for balance in balances), recordings[0]
     if not balances or named or is_quasi_static(first) or is_read_as_free(first):
@@ -106,15 +106,15 @@ def _predict_about_mean(recordings: Sequence[Recording], model: MechanicalModel,
 
 
 Prediction = tuple[MechanicalModel, PredictedForce]
-"""A model, and the measure by which its forces are compared."""
+"""A model, and the measure by which its predicted forces are compared with the commands."""
 
 
 def _leaves_less(linear: Prediction, given: Prediction) -> bool:
     """Whether the forces that the first model needs are closer to the commands than the second's: the mean over the
     axes of the error's power over the command's, on the samples to fit and to choose by of both."""
     kept = [
-        (ours.fit | ours.choose) & (other.fit | other.choose)
-        for ours, other in zip(linear[1].records, given[1].records, strict=True)
+        (own.fit | own.choose) & (other.fit | other.choose)
+        for own, other in zip(linear[1].records, given[1].records, strict=True)
     ]
     commands = np.vstack([record.command[mask] for record, mask in zip(given[1].records, kept, strict=True)])
     power = np.mean(commands**2, axis=0)

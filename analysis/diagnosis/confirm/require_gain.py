@@ -12,9 +12,8 @@ import numpy as np
 from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_something
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.revise_selection import without_effect
-from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import SearchResult, Unconfirmed, judge
 from analysis.diagnosis.settings import FURTHER_LAW_OF_ALL
 
 CONSTANT = "constant_force"
@@ -41,7 +40,7 @@ def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
     while found.steps and not _takes_enough(result.context, found):
         found = without_effect(result.context, found, len(found.steps) - 1)
         result = replace(result, found=found, judgement=judge(found), errors=None)
-    names = {placed.effect.name for placed in found.after.fitted.hypothesis.placed_effects()}
+    names = {placed.effect.name for placed in found.after.fitted.hypothesis.list_placed_effects()}
     if repeats or result.judgement.verdict != "explained" or names <= set(CONSTANTS):
         return result
     return replace(result, judgement=replace(result.judgement, verdict="partly_explained"))

@@ -1,7 +1,7 @@
 """Faults of an actuator, each as the change of the recorded command that undoes it.
 
 A recording holds the command u that was sent; a faulty actuator delivered a force g(u) instead. The faulty recording is
-explained by the sound device where u is replaced by g(u): "undoing" a fault therefore means to put the delivered force
+explained by the intact device where u is replaced by g(u): "undoing" a fault therefore means to put the delivered force
 in the place of the command. The laws g, with `size` 1 as given and other sizes by interpolation of u and g(u):
 
     force_gain        2 u                            force_offset      u + rms(u)

@@ -29,7 +29,7 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tupl
     if motions and np.isfinite(motions[0].band_hz):
         with suppress(np.linalg.LinAlgError, ValueError):
             bases: list[Base] = [force_base(motions, axis, turning) for axis in range(len(recording.command.channels))]
-            forces = bases if all(unexplained_share(base, clean) < BALANCE_HOLDS for base in bases) else []
+            forces = bases if all(compute_unexplained_share(base, clean) < BALANCE_HOLDS for base in bases) else []
     if forces:
         yield forces, motions
     fewest = min(sum(len(part.known) for part in side) for side in (clean, faulty) if side)
@@ -41,24 +41,24 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tupl
 def move_alike(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> bool:
     """Whether no response, detrended, moves more than `MOTIONS_APART` times as far on one side as on the other."""
     sizes = np.array(
-        [np.sqrt(np.mean([_detrended_mean_squares(part) for part in side], axis=0)) for side in (clean, faulty)]
+        [np.sqrt(np.mean([_compute_detrended_mean_squares(part) for part in side], axis=0)) for side in (clean, faulty)]
     )
     return bool(np.all(sizes.max(axis=0) <= MOTIONS_APART * sizes.min(axis=0)))
 
 
-def _detrended_mean_squares(part: Part) -> FloatArray:
+def _compute_detrended_mean_squares(part: Part) -> FloatArray:
     """(p,): mean squares of the responses about their least-squares lines."""
     at = np.arange(len(part.response)) - (len(part.response) - 1) / 2
     moved = part.response - part.response.mean(axis=0)
     return np.asarray(np.mean((moved - at[:, None] * (at @ moved / max(float(at @ at), 1.0))) ** 2, axis=0))
 
 
-def unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:
+def compute_unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:
     """Standard deviation of a base's residual over that of the signal; infinite where that is constant."""
-    return unexplained_share_of_rows(base, base.rows(parts), base.valid_samples(parts))
+    return compute_unexplained_share_of_rows(base, base.rows(parts), base.valid_samples(parts))
 
 
-def unexplained_share_of_rows(base: Base, parts: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
+def compute_unexplained_share_of_rows(base: Base, parts: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
     """The same from the base's rows of each part, and which of them are valid."""
     rows = np.vstack([part[mask] for part, mask in zip(parts, masks, strict=True)])
     signal = base.values(rows) if isinstance(base, AutoregressiveBase) else rows[:, 0]

@@ -22,9 +22,9 @@ from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.actuator_faults import actuator_faults
 from analysis.diagnosis.contrast.bases import (
     bases_of,
+    compute_unexplained_share,
+    compute_unexplained_share_of_rows,
     move_alike,
-    unexplained_share,
-    unexplained_share_of_rows,
 )
 from analysis.diagnosis.contrast.compared_base import Base, ComparedBase, compare_base, rows_with_fault_undone
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
@@ -43,7 +43,7 @@ from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
-from analysis.diagnosis.contrast.try_faults import ALL, TriedFaults, TriedVariant, allowed_sizes, try_faults
+from analysis.diagnosis.contrast.try_faults import ALL, TriedFaults, TriedVariant, restrict_sizes, try_faults
 from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
 from analysis.diagnosis.settings import (
     BALANCE_HOLDS,
@@ -135,7 +135,7 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], trial: TriedFaults) ->
         samples=samples,
         faulty_samples=faulty_samples,
         held_out=held_out,
-        faulty_share=min(unexplained_share(first.base, first.faulty.parts), 1.0),
+        faulty_share=min(compute_unexplained_share(first.base, first.faulty.parts), 1.0),
         usual=max(usual),
         usual_clean=usual[0],
         by_force=isinstance(first.base, ForceBase),
@@ -148,10 +148,13 @@ def _balances(compared_bases: Sequence[ComparedBase], tried: Sequence[TriedVaria
     """Whether the force balance fits the faulty set, with nothing or with the best fault undone. tried: the best
     first."""
     axes = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
-    if all(unexplained_share_of_rows(each.base, each.faulty.rows, each.faulty.masks) < BALANCE_HOLDS for each in axes):
+    if all(
+        compute_unexplained_share_of_rows(each.base, each.faulty.rows, each.faulty.masks) < BALANCE_HOLDS
+        for each in axes
+    ):
         return True
     return any(
-        all(unexplained_share_of_rows(each.base, *_undo(each, found)) < BALANCE_HOLDS for each in axes)
+        all(compute_unexplained_share_of_rows(each.base, *_undo(each, found)) < BALANCE_HOLDS for each in axes)
         for found in tried[:1]
     )
 
@@ -168,8 +171,8 @@ def _undo(compared: ComparedBase, found: TriedVariant) -> tuple[list[FloatArray]
 
 
 def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
-    """For each division of one set into two stretches: the error of a base for both over that of a base for each, less
-    1. sides: per base, the set's products (blocks, k, k)."""
+    """Relative excess error within one set: for each division into two stretches, the error of a single fit to both
+    over the sum of separate fits, less 1. sides: per base, the set's products (blocks, k, k)."""
 
     def error(blocks: Sequence[int]) -> float:
         return sum(error_of_own_fit(side[list(blocks)].sum(axis=0)) for side in sides)
@@ -190,7 +193,7 @@ def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, pl
     held_out = sum(held_out_error(kept, each.sizes, out) for out, kept, each in zip(SIXTHS, folds, fits, strict=True))
     # The control takes long, and a fault without a gain needs none.
     gains = (
-        list(_gains_within_a_set(compared_bases, fault, allowed_sizes(variant), fit.sizes))
+        list(_gains_within_a_set(compared_bases, fault, restrict_sizes(variant), fit.sizes))
         if plain.error > (1 + LEAST_FAULT_GAIN) * fit.error
         else [0.0]
     )

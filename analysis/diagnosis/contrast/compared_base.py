@@ -23,7 +23,7 @@ from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import Grams, Places, weights_of
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
-from analysis.diagnosis.data.correlated_residuals import lagged_products
+from analysis.diagnosis.data.correlated_residuals import compute_lagged_products
 from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_KEPT
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
@@ -89,7 +89,7 @@ class ComparedBase:
 
     def grams(self, side: RecordingSet, changed: Sequence[UndoneRows]) -> Grams:
         """Products of a side's rows and of their changes by undone faults; see `Grams`."""
-        which = [_changed_columns(each.rows, side.rows) for each in changed]
+        which = [_find_changed_columns(each.rows, side.rows) for each in changed]
         joined = np.hstack([side.white, *(self._changes(side, *each) for each in zip(changed, which, strict=True))])
         return Grams(
             np.array([block.T @ block for block in np.array_split(joined, CONTRAST_BLOCKS)]),
@@ -118,7 +118,7 @@ def apply_filter(impulse_response: FloatArray, samples: FloatArray) -> FloatArra
     return np.asarray(irfft(product, length, axis=0)[: len(samples)])
 
 
-def _changed_columns(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) -> Places:
+def _find_changed_columns(rows: Sequence[FloatArray], plain: Sequence[FloatArray]) -> Places:
     """Numbers of the columns in which the rows differ."""
     largest = np.array([np.abs(a - b).max(axis=0) for a, b in zip(rows, plain, strict=True)])
     return np.flatnonzero(largest.max(axis=0) > 0.0)
@@ -188,7 +188,7 @@ def _whitening_filter(errors: Sequence[FloatArray], masks: Sequence[Mask]) -> Fl
     masked = [np.where(mask, error, np.nan)[:, None] for error, mask in zip(errors, masks, strict=True)]
     autocovariance = np.sum(
         [
-            lagged_products(series, CONTRAST_WHITENING_ORDER)[:, 0]
+            compute_lagged_products(series, CONTRAST_WHITENING_ORDER)[:, 0]
             for series in masked
             if len(series) > CONTRAST_WHITENING_ORDER
         ],

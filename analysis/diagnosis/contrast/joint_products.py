@@ -113,7 +113,7 @@ def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
     """The sizes with the least error, every base fitted to both sides. variant: None = no fault."""
     if variant is None:
         return _fit_at(pairs, np.zeros(0))
-    sizes = _starting_sizes(variant)
+    sizes = _find_starting_sizes(variant)
     for _ in range(ROUNDS):
         gradients, grams = np.zeros(len(sizes)), np.zeros((len(sizes), len(sizes)))
         for pair in pairs:
@@ -138,7 +138,7 @@ def error_with_sizes(pairs: Sequence[Pair], sizes: FloatArray) -> float:
     return float(sum(_errors(pair, sizes).sum() for pair in pairs))
 
 
-def _starting_sizes(variant: Variant) -> FloatArray:
+def _find_starting_sizes(variant: Variant) -> FloatArray:
     count = len(variant.undo)
     return np.ones(count) if variant.least > 0 else np.zeros(count)
 

@@ -81,9 +81,9 @@ def mechanism_faults(
         "asymmetric_friction", [_asymmetric_friction(axis, wide * sharp) for wide in WIDER], ("coulomb_friction",)
     )
     yield axis.fault(
-        "presliding_hysteresis", [_presliding_variant(axis, give * width) for give in GIVES], ("coulomb_friction",)
+        "presliding_hysteresis", [_make_presliding_variant(axis, give * width) for give in GIVES], ("coulomb_friction",)
     )
-    yield axis.fault("cogging", [_cogging_variant(axis, way / count) for count in RIPPLES])
+    yield axis.fault("cogging", [_make_cogging_variant(axis, way / count) for count in RIPPLES])
     yield axis.fault("end_stop", [stop for share in STOPS for stop in _stops(axis, share * width)])
 
 
@@ -99,12 +99,12 @@ def _asymmetric_friction(axis: _Axis, wide: float) -> Variant:
     return Variant(undo, lambda s: {"level_positive": float(s[0]), "level_negative": float(s[1])}, least=0.0)
 
 
-def _presliding_variant(axis: _Axis, give: float) -> Variant:
+def _make_presliding_variant(axis: _Axis, give: float) -> Variant:
     parameters_of: ParametersOf = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / give}  # noqa: E731
     return Variant((axis.of(lambda m: bristle_bend(m.position[:, axis.channel], give)),), parameters_of, least=0.0)
 
 
-def _cogging_variant(axis: _Axis, pitch: float) -> Variant:
+def _make_cogging_variant(axis: _Axis, pitch: float) -> Variant:
     undo = (
         axis.of(lambda m: np.sin(2 * np.pi * m.position[:, axis.channel] / pitch)),
         axis.of(lambda m: np.cos(2 * np.pi * m.position[:, axis.channel] / pitch)),

@@ -2,7 +2,7 @@
 
 A fault of unknown size s changes the recording by s times a known column where it is small, and otherwise only near the
 size about which it was linearised. Each variant (axis, sign, corner frequency) is undone by least squares over its
-sizes, jointly with the parameters of the sound device; the best are linearised again about the size that was found, a
+sizes, jointly with the parameters of the intact device; the best are linearised again about the size that was found, a
 Gauss-Newton iteration whose step is judged by the error.
 """
 
@@ -120,9 +120,9 @@ def _fit_allowed_size(found: TriedVariant) -> TriedVariant:
     _, fault, variant, pairs = found
     if not variant.exact:
         return found
-    return TriedVariant(fit_sizes(pairs, allowed_sizes(variant)), fault, variant, pairs)
+    return TriedVariant(fit_sizes(pairs, restrict_sizes(variant)), fault, variant, pairs)
 
 
-def allowed_sizes(variant: Variant) -> Variant:
+def restrict_sizes(variant: Variant) -> Variant:
     """The variant, with its size fixed at 1 where it is a fault at size 1 only."""
     return fix_size(variant, 0.0) if variant.exact else variant

@@ -32,7 +32,7 @@ def agrees_with_folds(held: Sequence[FloatArray], folds: Sequence[FloatArray]) -
     return low > 0 and gain_with_bound(*held)[0] > 0
 
 
-def lagged_products(series: FloatArray, lags: int) -> FloatArray:
+def compute_lagged_products(series: FloatArray, lags: int) -> FloatArray:
     """(lags + 1, c): sample autocovariances, not normalised, of a time series (n, c); missing samples count as 0."""
     filled: FloatArray = np.where(np.isfinite(series).all(axis=1, keepdims=True), series, 0.0)
     return np.array([np.sum(filled[k:] * filled[: max(len(filled) - k, 0)], axis=0) for k in range(lags + 1)])

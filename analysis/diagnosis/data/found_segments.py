@@ -42,7 +42,7 @@ def find_segments(recording: Recording) -> tuple[Recording, str]:
     if recording.segments:
         return recording, ""
     parts = parts_of(recording)
-    designed = designed_command(recording).samples
+    designed = find_designed_command(recording).samples
     periods = [exact_period(designed[start:stop]) for start, stop in parts]
     if not any(periods):
         return recording, ""
@@ -53,7 +53,7 @@ def find_segments(recording: Recording) -> tuple[Recording, str]:
     return replace(recording, segments=segments), _segments_sentence(segments)
 
 
-def designed_command(recording: Recording) -> Signal:
+def find_designed_command(recording: Recording) -> Signal:
     """The signal that was designed beforehand: the excitation where one was recorded and varies, else the command."""
     excitation = recording.excitation
     if excitation is None:

@@ -66,7 +66,7 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str], sho
     problems += _constant_signals(recordings)
     few: tuple[str, ...] = ()
     if not problems:
-        known = _answered_samples(recordings)
+        known = _count_answered_samples(recordings)
         few = tuple(_shortness(recordings))
         if known < LEAST_SAMPLES:
             problems.append(f"{known} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
@@ -89,17 +89,17 @@ def require_something(recordings: Sequence[Recording], names: Sequence[str], sho
 
 def is_too_short_to_name(recordings: Sequence[Recording]) -> bool:
     """Whether recordings are so short that other laws would explain them about as well."""
-    known = _answered_samples(recordings)
+    known = _count_answered_samples(recordings)
     return known < SHORTEST_SAMPLES and known / recordings[0].sample_rate_hz < SHORTEST_S
 
 
-def _answered_samples(recordings: Sequence[Recording]) -> int:
+def _count_answered_samples(recordings: Sequence[Recording]) -> int:
     return sum(int(np.isfinite(recording.response.samples).all(axis=1).sum()) for recording in recordings)
 
 
 def _shortness(recordings: Sequence[Recording]) -> Iterator[str]:
     if is_too_short_to_name(recordings):
-        known = _answered_samples(recordings)
+        known = _count_answered_samples(recordings)
         yield (
             f"{known} samples, {known / recordings[0].sample_rate_hz:.3g} s, are too short a recording to name physics "
             f"by; at least {SHORTEST_S:g} s or {SHORTEST_SAMPLES} samples are needed, one part to fit and one to test"
@@ -136,10 +136,10 @@ def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) ->
     problems = problems or weight_problems(model, recordings, names)
     if not problems:
         problems = (
-            *_unconnected_channels(model, first),
+            *_find_unconnected_channels(model, first),
             *_instability(model, recordings),
             *_too_fast_modes(model, first),
-            *_misplaced_effects(model, first),
+            *_find_misplaced_effects(model, first),
         )
     if problems:
         raise NothingToDiagnose(problems)
@@ -233,10 +233,10 @@ def _impossible_model_values(model: MechanicalModel) -> Iterator[str]:
         yield f"the model's lightest motion has a mass of {lightest:.3g}, which no device has"
 
 
-def _unconnected_channels(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     """Inputs of the model that drive nothing, or the same motion as another, and outputs that measure nothing."""
     idle = [name for name, column in zip(recording.command.channels, model.input.T, strict=True) if not column.any()]
-    blind = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
+    unconnected = [name for name, row in zip(recording.response.channels, model.output, strict=True) if not row.any()]
     if idle:
         yield f"the model's input lets {', '.join(idle)} drive nothing"
     elif (apart := int(np.linalg.matrix_rank(model.input))) < model.inputs:
@@ -244,8 +244,8 @@ def _unconnected_channels(model: MechanicalModel, recording: Recording) -> Itera
             f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so they cannot "
             "be told apart; make one command of those that push the same"
         )
-    if blind:
-        yield f"the model's output lets {', '.join(blind)} see nothing"
+    if unconnected:
+        yield f"the model's output lets {', '.join(unconnected)} see nothing"
 
 
 def _instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
@@ -269,7 +269,7 @@ def _too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterator[st
         )
 
 
-def _misplaced_effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
+def _find_misplaced_effects(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     try:
         place_recorded_effects(model, recording)
     except PlacingError as problem:

@@ -35,7 +35,7 @@ def has_motion(recording: Recording, model: MechanicalModel) -> bool:
     )
 
 
-def measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFloor) -> MeasuredMotion:
+def choose_measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFloor) -> MeasuredMotion:
     """The position where it was measured, else the response: a velocity is integrated by the trapezoidal rule, and its
     noise divided by (2 pi f)². floor: noise of the recording. See `has_motion`."""
     m, rate_hz = model.inputs, recording.sample_rate_hz

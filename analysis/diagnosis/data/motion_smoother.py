@@ -31,7 +31,6 @@ _MATRIX = types.float64[:, ::1]
 _READ = types.Array(types.float64, 2, "C", readonly=True)
 
 
-# A Kalman smoother of constant gains, compiled: forwards, then backwards (Rauch, Tung and Striebel 1965).
 @njit(types.void(_MATRIX, _MATRIX, _MATRIX, _MATRIX, _READ, _READ, _MATRIX), cache=True, nogil=True)
 def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its products out
     advance: FloatArray,
@@ -42,7 +41,9 @@ def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its p
     measured: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill out (n, s), the smoothed states. advance (s, s), observation (c, s), gain (s, c), back (s, s): see
+    """Kalman smoother of constant gains, forwards, then backwards (Rauch, Tung and Striebel 1965).
+
+    Fill out (n, s), the smoothed states. advance (s, s), observation (c, s), gain (s, c), back (s, s): see
     `motion_smoother`. pushed (n, s): input of the step that begins at a sample. measured (n, c): NaN where nothing was
     measured."""
     n, s, c = out.shape[0], out.shape[1], observation.shape[0]

@@ -85,12 +85,12 @@ class Observed:
 def observe(recording: Recording, responses: int) -> Observed:
     """A recording with its samples' roles. responses: number of the model's outputs; a position with another number of
     channels is left out."""
-    measured, known = measured_signals(recording, responses)
+    measured, known = stack_measured_signals(recording, responses)
     fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording)))
     return Observed(recording, recording.command.samples, measured, fit, choose, test)
 
 
-def measured_signals(recording: Recording, responses: int) -> tuple[FloatArray, Mask]:
+def stack_measured_signals(recording: Recording, responses: int) -> tuple[FloatArray, Mask]:
     """Response and, where it has as many channels, position (n, c), and the mask of samples where all are known."""
     signals = [recording.response.samples]
     if recording.position is not None and recording.position.samples.shape[1] == responses:
@@ -109,7 +109,7 @@ class Span:
     stop: int
 
 
-def moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) -> tuple[Span, ...]:
+def find_moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) -> tuple[Span, ...]:
     """Parts with the end of their motion: the last sample at which any channel differs from its rest at the part's end
     by more than `AT_REST` of its range. response: (n, p)."""
     return tuple(Span(start, start + _end_of_motion(response[start:stop]), stop) for start, stop in parts)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed import Observed, measured_signals, moving_spans, roles
+from analysis.diagnosis.data.observed import Observed, find_moving_spans, roles, stack_measured_signals
 from analysis.diagnosis.settings import CHOOSE_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
@@ -17,7 +17,7 @@ LEAST_SAMPLES = 32
 """Least samples of a part."""
 
 
-def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
+def observe_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
     """Parts of all recordings, ready for comparison. responses: number of position channels that belong to the model's
     outputs. Roles are those of the whole set: where any recording is marked for the test, no other gives up samples for
     it; where all are marked as test, none is held out."""
@@ -27,8 +27,8 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
     tested = any(segment.role == "test" for recording in recordings for segment in recording.segments)
     found: list[Observed] = []
     for recording in recordings:
-        measured, known = measured_signals(recording, responses)
-        spans = moving_spans(recording.response.samples, parts_of(recording))
+        measured, known = stack_measured_signals(recording, responses)
+        spans = find_moving_spans(recording.response.samples, parts_of(recording))
         fit, choose, test = roles(recording.segments, len(recording), tested, spans)
         masks = (*_without_repeats(fit & known, choose & known, ~_surplus_periods(recording)), test & known)
         for start, stop in parts_of(recording):
@@ -40,7 +40,7 @@ def observed_parts(recordings: Sequence[Recording], responses: int) -> tuple[Obs
 
 def samples_to_fit(recordings: Sequence[Recording]) -> int:
     """Number of samples to fit that have a response, and a position where there is one per response channel."""
-    return sum(int(record.fit.sum()) for record in observed_parts(recordings, len(recordings[0].response.channels)))
+    return sum(int(record.fit.sum()) for record in observe_parts(recordings, len(recordings[0].response.channels)))
 
 
 def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
@@ -110,7 +110,7 @@ def _clear_roles(recording: Recording) -> Recording:
 
 
 def names_of_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """Names of the parts in the order of `observed_parts`: the recording's name, with the part's number where there are
+    """Names of the parts in the order of `observe_parts`: the recording's name, with the part's number where there are
     several."""
     found: list[str] = []
     for number, recording in enumerate(recordings):

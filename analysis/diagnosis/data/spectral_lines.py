@@ -18,10 +18,12 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 Band = tuple[float, float]
+"""Lower edge (Hz), included, and upper edge (Hz), excluded."""
 _SILENT = 3e-3
-"""Largest amplitude of a silent line, relative to the strongest line of its input."""
+"""Largest amplitude of a silent line, relative to the strongest line of its input, or to a tenth of the strongest of
+all inputs if that is more. By hand."""
 _DRIVEN = 0.01
-"""Least power of a driven command, relative to the strongest."""
+"""Least power of a driven input, relative to the strongest. By hand."""
 _TINY = np.finfo(np.float64).tiny
 _LARGEST = 1e300
 """Upper limit of an F ratio: SciPy returns NaN for infinity."""
@@ -72,7 +74,8 @@ def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines |
 
 
 def hold_length(command: npt.NDArray[np.float64]) -> int:
-    """Number of samples for which each value of the command is held. command: (n, inputs)"""
+    """Number of samples for which each value of the command is held: greatest common divisor of the distances between
+    its changes; 1 where it hardly changes. command: (n, inputs)."""
     moves = np.flatnonzero(np.any(np.diff(command, axis=0) != 0, axis=1))
     return int(np.gcd.reduce(np.diff(moves))) if len(moves) > 16 else 1
 
@@ -100,9 +103,12 @@ def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[st
 def noncentral_f_sf(
     ratio: npt.ArrayLike, lines: npt.ArrayLike, freedom: npt.ArrayLike, noncentrality: npt.ArrayLike
 ) -> FloatArray:
-    """P(F >= ratio) with 2 `lines` and `freedom` degrees of freedom, by Patnaik's central F of equal moments (1949).
+    """P(F >= ratio) of a noncentral F distribution with d = 2 `lines` and `freedom` degrees of freedom, by the central
+    F of equal first two moments (Patnaik, Biometrika 36 (1949) 202): with noncentrality c,
 
-    Exact for noncentrality 0. Chosen over the series because it holds for noncentralities of millions, too.
+        d' = (d + c)² / (d + 2 c),    P(F >= f) = P(F_central(d', freedom) >= f d / (d + c)).
+
+    Exact for c = 0. Chosen over the series because it also holds for noncentralities of millions.
     """
     degrees = 2 * np.asarray(lines, dtype=np.float64)
     shift = np.asarray(noncentrality, dtype=np.float64)
@@ -114,7 +120,10 @@ def noncentral_f_sf(
 def excess(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float, float, float]:
     """Summed power beyond noise, its detection limit (two standard errors of the noise), and the p-value.
 
-    power: (lines,) squared magnitudes. noise: (lines,) their expectation without a signal, known with `freedom`.
+    power: p (lines,), squared magnitudes. noise: s (lines,), their expectation without a signal, estimated with
+    `freedom` degrees of freedom. Without a signal each p is exponential with mean s, so that the mean of p / s has an F
+    distribution with 2 lines and `freedom` degrees of freedom, and the variance of sum(p - s) is
+    sum(s²) + 2 sum(s)² / freedom, the second part from the error of s, which all lines share.
     """
     if len(power) == 0 or not np.isfinite(noise).all():
         return 0.0, 0.0, 1.0

@@ -19,10 +19,9 @@ from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.parsimony import leaves_far_less
-from analysis.diagnosis.search.search import SearchResult, Unconfirmed
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import is_within_data
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import SearchResult, Unconfirmed, judge
 from analysis.diagnosis.settings import HELD_OUT_ALONE_ERROR, LAW_MOST_ROUNDS, NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import AxisForce
@@ -40,8 +39,8 @@ class LawSearch:
     """Per search: the re-tuned model, the most laws, and what was found."""
 
     def add_short(self, result: SearchResult) -> SearchResult:
-        """As `add_any`, with laws only where they are likely to explain all, and are a shorter description than two
-        effects of the catalogue: see `is_short`."""
+        """Add laws as `add_any`, but only where they are likely to explain all of the mismatch with a shorter
+        description than two effects of the catalogue: see `is_short`."""
         if not _needs_law(result) or not self.time_left():
             return result
         found = discover(result.context, result.found, self.progress, self.time_left, LAW_MOST_ROUNDS, alone=True)
@@ -157,7 +156,7 @@ def _held_out_log_error(of: FittedCandidate) -> float:
 
 
 def _rivals(context: SearchContext, known: Explanation) -> list[FittedCandidate]:
-    """What the catalogue offers instead: what is named, and the best candidate of the first round."""
+    """Rivals of a law from the catalogue: the explanation that is named, and the best candidate of the first round."""
     rivals = [known.after] if known.steps else []
     if known.rounds and known.rounds[0]:
         rivals.append(context.with_test_score(known.rounds[0][0]))
@@ -174,8 +173,9 @@ def _candidates(context: SearchContext, found: Discovery, reasons: tuple[str, ..
 
 
 def _keep_rounds_of(of: Discovery, fewer: Explanation) -> Discovery | None:
-    """With an explanation that holds some of the laws, in their order, and the first rounds that found such. None where
-    it holds no law, or one whose round is not known: the checks of a law are those of its round."""
+    """The discovery restricted to an explanation `fewer` with some of its laws, in their order, and the first rounds
+    that found these. None where it holds no law, or one whose round is not known: the checks of a law are those of its
+    round."""
     if not fewer.steps:
         return None
     kept = [_structure(law) for law in laws_of(fewer.after.fitted.hypothesis)[-len(fewer.steps) :]]

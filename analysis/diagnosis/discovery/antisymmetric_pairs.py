@@ -1,7 +1,7 @@
 """Antisymmetric pairs: a force on one axis by the motion of another, and the opposite on that axis by the first one's.
 
 Of such a pair each half alone looks as if it were half a coupled damping or stiffness, which acts on both axes alike
-and which the model has as a number of its own: only both together are fitted. With velocities it is a gyroscopic or
+and which the model has as a separate parameter: only both together are fitted. With velocities it is a gyroscopic or
 Lorentz force, with positions a circulatory one (Merkin, Introduction to the Theory of Stability, 1997).
 """
 
@@ -22,7 +22,6 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.discovered_law import axis_names
 
 _COUPLED = re.compile(rf"p0\*(v?)([{AXES}])")
@@ -55,8 +54,8 @@ def _pair(own: Sum, partner: Sum, factor: float) -> Sum:
 
 
 def pair_starts(pair: Sum) -> tuple[Sum, ...]:
-    """Where its fit may start: where the axes are coupled, either half alone was fitted as the whole pair, beside a
-    coupled parameter of the model, and so is twice as large."""
+    """Starting values of a pair's fit: as found, and with half of the factor. Where the model couples the axes, a half
+    was fitted as the whole pair, beside a coupled parameter, and is twice too large."""
     assert pair.partner is not None
     half, opposite = pair.factors[0] / 2, replace(pair.partner, factors=(pair.partner.factors[0] / 2,))
     return pair, replace(pair, factors=(half,), partner=opposite)
@@ -67,10 +66,12 @@ def is_coupling(of: Sum) -> bool:
     return of.acts_on == "force" and len(of.terms) == 1 and bool(_COUPLED.fullmatch(f"p0*{of.terms[0].shape}"))
 
 
-def coupling_taken(tuning: Tuning, fitted: Fitted) -> float:
+def sum_squares_of_coupling(tuning: Tuning, fitted: Fitted) -> float:
     """Sum of squares of the deviations of the model's coupled damping and stiffness from their calibration."""
     m = tuning.model.inputs
-    places = [_coupled_parameter(tuning, prefix, i, j) for prefix in ("v", "") for i, j in combinations(range(m), 2)]
+    places = [
+        _find_coupled_parameter(tuning, prefix, i, j) for prefix in ("v", "") for i, j in combinations(range(m), 2)
+    ]
     return float(np.sum(fitted.deviations[places] ** 2))
 
 
@@ -94,18 +95,18 @@ def with_equal_halves(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> 
     """The fit with the two factors of each pair made opposite and equal, and what they had in common given to the
     model's coupled parameter, which does the same. Unchanged where there is no pair, or the parameter would leave its
     bounds."""
-    found = _coupled_laws(fitted, measure.records[0].recording.command.channels)
+    found = _find_coupled_laws(fitted, measure.records[0].recording.command.channels)
     values, deviations = (
-        [dict(placed.values) for placed in fitted.hypothesis.placed_effects()],
+        [dict(placed.values) for placed in fitted.hypothesis.list_placed_effects()],
         fitted.deviations.copy(),
     )
     for (prefix, axis, other), (claim, factor) in found.items():
         partner, opposite = found.get((prefix, other, axis), (claim, 0.0))
         if axis < other and factor * opposite < 0:
-            shared, number = (factor + opposite) / 2, _coupled_parameter(tuning, prefix, axis, other)
+            shared, number = (factor + opposite) / 2, _find_coupled_parameter(tuning, prefix, axis, other)
             deviations[number] -= shared / tuning.deviation[number]
             values[claim]["p0"], values[partner]["p0"] = factor - shared, opposite - shared
-    if (deviations == fitted.deviations).all() or np.abs(deviations).max() > RETUNING_BOUND:
+    if (deviations == fitted.deviations).all() or np.abs(deviations).max() > tuning.bound:
         return fitted
     parts = zip(fitted.hypothesis.claims, values, strict=True)
     hypothesis = reduce(combine, [hypothesis_of_claim(claim, [own]) for claim, own in parts])
@@ -116,17 +117,17 @@ def is_taken_by_coupling(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]
     """Whether a law is linear in another axis's motion alone, and the model's own coupled damping or stiffness could
     have made half of it: always where it acts on one axis; of an antisymmetric pair, where that number would stay
     within the bound of re-tuning. inputs: command channels."""
-    found = _coupled_laws(fitted, inputs)
+    found = _find_coupled_laws(fitted, inputs)
     for (prefix, axis, other), (_, factor) in found.items():
         opposite = found.get((prefix, other, axis), (0, 0.0))[1]
         half = abs(factor - opposite) / 2 if factor * opposite < 0 else 0.0
-        number = _coupled_parameter(tuning, prefix, axis, other)
-        if half / tuning.deviation[number] - abs(fitted.deviations[number]) <= RETUNING_BOUND:
+        number = _find_coupled_parameter(tuning, prefix, axis, other)
+        if half / tuning.deviation[number] - abs(fitted.deviations[number]) <= tuning.bound:
             return True
     return False
 
 
-def _coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, int, int], tuple[int, float]]:
+def _find_coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, int, int], tuple[int, float]]:
     """Claim and factor of each force that is linear in another axis's motion, by prefix of the motion, its own axis and
     the other one."""
     names, found = axis_names(inputs), {}
@@ -137,7 +138,7 @@ def _coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, in
     return found
 
 
-def _coupled_parameter(tuning: Tuning, prefix: str, axis: int, other: int) -> int:
+def _find_coupled_parameter(tuning: Tuning, prefix: str, axis: int, other: int) -> int:
     """Which of the model's parameters is the coupled damping (prefix v) or stiffness of two axes."""
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]

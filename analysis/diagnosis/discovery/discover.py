@@ -139,7 +139,7 @@ def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget, 
             *(item for view, found in searched for item in found.sums if not _undoes_command(view, item)),
             *antisymmetric_pairs(views),
         ),
-        key=lambda item: _explained_squares(views, item),
+        key=lambda item: _compute_explained_squares(views, item),
         reverse=True,
     )
     chosen = _choose_sums_to_fit(_keep_close_to_best(_best_of_each_structure(every)))
@@ -172,7 +172,8 @@ def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
 
 
 def _views_to_search(views: Sequence[View]) -> list[View]:
-    """Of axes and of readings, the two with the largest excess error each at most, the largest first."""
+    """Views in which laws are searched: of axes and of readings at most two each, those with the largest excess error,
+    the largest first."""
     found: list[View] = []
     for acts_on in ("force", "response"):
         missing = [(_excess(view), view.output) for view in views if view.acts_on == acts_on]
@@ -206,7 +207,7 @@ def _excess(view: View) -> float:
     return float(without.sum()) / (view.noise * len(view.residual))
 
 
-def _explained_squares(views: Sequence[View], each: Sum) -> float:
+def _compute_explained_squares(views: Sequence[View], each: Sum) -> float:
     view = next(view for view in views if (view.acts_on, view.axis) == (each.acts_on, each.axis))
     own = (each.without - each.cross_validated) * view.noise * len(view.residual)
     # A pair's errors are the mean of both halves'.

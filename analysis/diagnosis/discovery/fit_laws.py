@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from analysis.diagnosis.discovery.antisymmetric_pairs import as_pair, coupling_taken, is_coupling, pair_starts
+from analysis.diagnosis.discovery.antisymmetric_pairs import as_pair, is_coupling, pair_starts, sum_squares_of_coupling
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, laws_of
 from analysis.diagnosis.discovery.snap_exponents import is_whole_limit
@@ -17,7 +17,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.parsimony import inseparable
 from analysis.diagnosis.search.search_context import FIRST_ROUNDS, FittedCandidate, SearchContext, sensitivity_at
 from analysis.diagnosis.search.time_budget import OutOfTimeError
-from analysis.diagnosis.settings import AT_RETUNING_BOUND, LAW_NEAR, RETUNING_BOUND
+from analysis.diagnosis.settings import LAW_NEAR
 from analysis.diagnosis.types import TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModelError
 
@@ -37,7 +37,7 @@ def fit_sums(
         (within_time(partial(first, start), start), each)
         for each in sums
         if time_left()
-        for start in _starting_fits(context, base, each)
+        for start in _make_starting_fits(context, base, each)
     ]
     fits.sort(key=lambda pair: pair[0].cost)
     if not fits or not np.isfinite(fits[0][0].cost):
@@ -62,13 +62,14 @@ def fit_sums(
     return (*refined, *(pair for pair in rest if pair not in close))
 
 
-def _starting_fits(context: SearchContext, base: Fitted, each: Sum) -> list[Fitted]:
+def _make_starting_fits(context: SearchContext, base: Fitted, each: Sum) -> list[Fitted]:
     """The sum added to the fit, with the model's own parameters as they were or shifted as the sum's fit has them,
     whichever costs less; where re-tuning ended at a bound, for want of this law, also with the parameters as given."""
     recording = context.measure.records[0].recording
-    shifted = np.clip(base.deviations + each.model_shift, -RETUNING_BOUND, RETUNING_BOUND)
+    bound = context.tuning.bound
+    shifted = np.clip(base.deviations + each.model_shift, -bound, bound)
     given = np.zeros_like(base.deviations)
-    at_bound = np.abs(base.deviations).max(initial=0.0) >= AT_RETUNING_BOUND * RETUNING_BOUND
+    at_bound = context.tuning.is_at_bound(base.deviations)
     starts = (each,) if each.partner is None else pair_starts(each)
     chosen: list[Fitted] = []
     for several in ((base.deviations, shifted), *([(given,)] if at_bound else [])):
@@ -96,19 +97,21 @@ def _like_best(
 def put_plainest_first(
     context: SearchContext, pairs: Sequence[tuple[FittedCandidate, Sum]]
 ) -> list[tuple[FittedCandidate, Sum]]:
-    """By error; but first comes, of those that these data cannot tell from the best, the one with fewest parameters; of
-    forces that are linear in another axis's motion, the one that asks least of the model's own coupled parameters."""
+    """The candidates by rising error, with the preferred one moved to the front: among those inseparable from the best,
+    the one with the fewest parameters; among forces that are linear in another axis's motion, the one with the smallest
+    change of the model's own coupled parameters."""
     ranked = sorted(pairs, key=lambda pair: pair[0].score.mean_log_error)
     alike = [pair for pair in ranked if inseparable(ranked[0][0], pair[0])]
     first = min(alike, key=_count_parameters)
     if is_coupling(first[1]):
         same = [pair for pair in alike if is_coupling(pair[1]) and _count_parameters(pair) == _count_parameters(first)]
-        first = min(same, key=lambda pair: coupling_taken(context.tuning, pair[0].fitted))
+        first = min(same, key=lambda pair: sum_squares_of_coupling(context.tuning, pair[0].fitted))
     return [first, *(pair for pair in ranked if pair is not first)]
 
 
 def _count_parameters(pair: tuple[FittedCandidate, Sum]) -> int:
-    """Free numbers of a sum, without exponents that are whole or half numbers, and a soft limit's factor of 1."""
+    """Number of free parameters of a sum, without exponents that are whole or half numbers, and a soft limit's factor
+    of 1."""
     candidate, of = pair
     law = laws_of(candidate.fitted.hypothesis)[-1]
     count = 0 if law is None else -int(is_whole_limit(law, LAW_NEAR))

@@ -157,8 +157,8 @@ def _memory(of: Axis, others: Sequence[Axis], seconds: float, rate_hz: float) ->
         for name in (of.x, of.v, of.f):
             yield Term(f"lag({name}, p0)", (tau,), bounds)
     for tau in np.geomspace(0.1, max(seconds / 3, 0.2), 5).tolist():
-        for name, felt in ((of.f, of.f), (of.x, of.x), (of.v, of.v)):
-            yield Term(f"{name}*lag({felt}**2, p0)", (tau,), ((shortest, 10 * longest),))
+        for name, squared in ((of.f, of.f), (of.x, of.x), (of.v, of.v)):
+            yield Term(f"{name}*lag({squared}**2, p0)", (tau,), ((shortest, 10 * longest),))
     for share in (0.03, 0.1, 0.2, 0.4, 0.7):
         yield Term(f"play({of.x}, p0)", (share * of.travel,), ((1e-3 * of.travel, of.travel),))
     for late in (2 * shortest, 5 * shortest, 0.01, 0.03):

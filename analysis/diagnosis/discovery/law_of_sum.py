@@ -8,7 +8,7 @@ from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import AXES
 from analysis.diagnosis.errors.hypothesis import Hypothesis, combine
 from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
-from equalizer.effects.discovered_law import axis_names, has_memory, law_channels, reading_names
+from equalizer.effects.discovered_law import axis_names, has_memory, law_channels, names_of_readings
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 
@@ -21,7 +21,7 @@ def law_of_sum(of: Sum, recording: Recording) -> Law:
     driven axes and the channels of the response x, y, z in their order; the law calls them as the recording does. What
     hangs on commands alone and remembers nothing is a law of the command: then it can be undone."""
     channels = law_channels(recording)
-    names, readings = axis_names(channels.inputs), reading_names(channels)
+    names, readings = axis_names(channels.inputs), names_of_readings(channels)
     parts: list[str] = []
     numbers: list[float] = []
     for term, factor in zip(of.terms, of.factors, strict=True):

@@ -112,7 +112,7 @@ class View:
 
 def views_of(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[View, ...]:
     """One view per driven axis, then one per channel of the response that the grammar has a name for."""
-    model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects()
+    model, placed = tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
     seen = tuple(_filter_record(measure, record, own) for record, own in zip(measure.records, evidence, strict=True))
     residual = np.concatenate(
@@ -141,9 +141,9 @@ def _zero_missing(left: FloatArray) -> FloatArray:
 def _parameter_columns(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, seen: Sequence[FilteredRecord], number: int
 ) -> FloatArray:
-    """(s, m + p): effect of one standard deviation of one of the model's numbers. That of mass, damping and stiffness
-    follows from the force along the measured motion, exact however wrong the model is; that of modes from the model
-    without the hypothesis."""
+    """(s, m + p): effect of one standard deviation of one of the model's parameters. That of mass, damping and
+    stiffness follows from the force along the measured motion, exact however wrong the model is; that of modes from the
+    model without the hypothesis."""
     m = tuning.model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     if number < 3 * len(pairs):
@@ -194,7 +194,7 @@ def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) 
     strength = np.maximum(strength, 1e-9 * strength.max(axis=0))
     share = 2 * (last - 1) / length
     # What a force does near the end is cut off there.
-    end = n - min(_settling_samples(measure, evidence), n // 4)
+    end = n - min(_count_settling_samples(measure, evidence), n // 4)
     kept = tuple(slice(int(a * share), int(min(b, end) * share)) for a, b in _blocks(record) if a < end)
     forces = isinstance(measure, PredictedForce)
     units = measure.unit[: 0 if forces else evidence.response.shape[1]]
@@ -211,7 +211,7 @@ def _force_response(measure: ErrorMeasure, evidence: Evidence, lines: FloatArray
     return np.asarray(np.concatenate([seen.response, seen.position], axis=1)[:, :c] / measure.unit[:, None])
 
 
-def _settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
+def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
     """Samples until the response to a force has decayed."""
     if isinstance(measure, PredictedForce):
         return 0

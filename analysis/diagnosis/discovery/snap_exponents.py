@@ -103,7 +103,7 @@ def _simplify_limit(law: Law, error: float) -> Law:
 
 
 def substitute_parameter(law: Law, place: int, value: float) -> Law:
-    """The law with free number `place` replaced by a value in the formula."""
+    """The law with the free parameter `place` replaced by a value in the formula."""
     text = re.sub(rf"\bp{place}\b", f"{value:g}", law.expression)
     renamed = re.sub(r"\bp(\d+)\b", lambda found: f"p{int(found[1]) - (int(found[1]) > place)}", text)
     numbers = (*law.numbers[:place], *law.numbers[place + 1 :])

@@ -124,7 +124,7 @@ def _insignificant_gain(
 
 
 def _equally_good_laws(context: SearchContext, of: Discovery, number: int) -> Iterator[str]:
-    """Laws of other variables that fit as well, that held-out data do not tell from it either, and that predict
+    """Laws of other variables that fit as well, that held-out data do not distinguish from it either, and that predict
     something else."""
     found = of.rounds[number]
     best = found.fitted_candidates[0]
@@ -172,7 +172,8 @@ def does_as_well_with_less(context: SearchContext, of: Discovery, rival: FittedC
 
 
 def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
-    """In what the held-out stretches differ from those in which laws are found; empty where they are alike. A segment
+    """Words for how the held-out stretches differ from those in which laws are found (stronger commands, axes driven
+    together, another kind of command); empty where they are alike. A segment
     of which only the end is held out counts as both; rest counts as neither."""
     found: list[tuple[str, tuple[int, ...], float]] = []
     sealed: list[tuple[str, tuple[int, ...], float]] = []
@@ -189,9 +190,9 @@ def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
     if not found:
         return ()
     kinds, axes = {kind for kind, _, _ in found}, {driven for _, driven, _ in found}
-    loudest = max(level for _, _, level in found)
+    strongest = max(level for _, _, level in found)
     said = [
-        (any(level > LOUDER * loudest for _, _, level in sealed), "louder commands"),
+        (any(level > LOUDER * strongest for _, _, level in sealed), "louder commands"),
         (any(driven not in axes and len(driven) > 1 for _, driven, _ in sealed), "axes driven together"),
         (any(kind not in kinds for kind, _, _ in sealed), "another kind of command"),
     ]
@@ -206,8 +207,8 @@ def _describe_segment(segment: Segment, command: FloatArray) -> tuple[str, tuple
 def proof_sentence(
     context: SearchContext, found: Explanation, rivals: Sequence[FittedCandidate], chosen_of: int = 1
 ) -> str:
-    """On what a named law was tested, its error beside that of the best of the catalogue, how many laws fitted alike,
-    and the range of motion beyond which it is unknown, as one to three sentences."""
+    """One to three sentences: on which data a named law was tested, its error beside that of the best of the catalogue,
+    how many laws fitted alike, and the range of motion beyond which it is unknown."""
     whole, after = context.whole, found.after
     laws = [law for law in laws_of(after.fitted.hypothesis) if law is not None]
     where = conjoin(held_out_kinds(whole.records))
@@ -234,7 +235,7 @@ def _held_out_error_share(context: SearchContext, found: Explanation, law: Fitte
 def _range_of_motion(context: SearchContext, found: Explanation, names: set[str]) -> tuple[str, ...]:
     """The largest position and speed of each axis that the law uses, held-out samples included, as text."""
     measure, fitted = context.whole, found.after.fitted
-    model, placed = context.tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects()
+    model, placed = context.tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
     letters = axis_names(measure.records[0].recording.command.channels)
     length, time = model.system.length, model.system.time

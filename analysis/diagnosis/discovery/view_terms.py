@@ -24,14 +24,14 @@ def view_terms(view: View) -> tuple[Term, ...]:
     """All terms of a view; pitches and frequencies are those of its first recording."""
     seen = view.records[0]
     if view.acts_on == "response":
-        return reading_terms(seen.columns, view.axis, len(seen.reading_units))
+        return terms_of_readings(seen.columns, view.axis, len(seen.reading_units))
     axes = axes_of(seen.columns, seen.missing_force.shape[1])
     terms = terms_of(axes, view.axis, len(seen.missing_force) / seen.rate_hz, seen.rate_hz)
     lines = periodic_terms(seen.columns, axes[view.axis], seen.missing_force[:, view.axis], seen.rate_hz)
     return (*terms, *lines)
 
 
-def reading_terms(columns: Columns, channel: int, channels: int) -> tuple[Term, ...]:
+def terms_of_readings(columns: Columns, channel: int, channels: int) -> tuple[Term, ...]:
     """All terms for one channel of a response of so many. What is linear in readings is none: a gain, a lag or another
     axis's share are effects of the catalogue."""
     names = [f"a{axis}" for axis in AXES[:channels]]

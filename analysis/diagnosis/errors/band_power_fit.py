@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.diagnosis.errors.band_power import BandPower
 from analysis.diagnosis.errors.hypothesis import FreeParameter, Hypothesis
-from analysis.diagnosis.errors.output_error import bounded_step
+from analysis.diagnosis.errors.output_error import solve_bounded_step
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.types import Mapper
 from equalizer.plant.mechanical_model import MechanicalModelError
@@ -70,7 +70,7 @@ class View:
     def _member(self, deviations: FloatArray, hypothesis: Hypothesis) -> FloatArray:
         try:
             model = self.tuning.tune(deviations)
-            return self.power.predict(self.power.measure.residuals(model, hypothesis.placed_effects()))
+            return self.power.predict(self.power.measure.residuals(model, hypothesis.list_placed_effects()))
         except (MechanicalModelError, np.linalg.LinAlgError):
             return np.full(self.power.measured.shape, np.nan)
 
@@ -160,7 +160,7 @@ def _gauss_newton_step(view: View, at: BandPowerFit) -> BandPowerFit:
         products[:t, :t] += np.eye(t)
     products += 1e-9 * np.diag(np.maximum(np.diagonal(products), 1e-9))
     low, high = _step_bounds(at, t)
-    step = bounded_step(products, rhs, low, high)
+    step = solve_bounded_step(products, rhs, low, high)
     there = at
     for share in SHARES:
         deviations = at.deviations + share * step[:t] if t else at.deviations

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed, error_units
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import UNTIMED, Choice, choose_measure, samples_to_settle
@@ -64,7 +64,7 @@ def measure_of(
     if compared == "force":
         return measure_by_force(recordings, model, None)
     records, others = (
-        tuple(_leave_out_beginning(record, model) for record in observed_parts(these, model.outputs)) if these else ()
+        tuple(_leave_out_beginning(record, model) for record in observe_parts(these, model.outputs)) if these else ()
         for these in (recordings, beside)
     )
     floors = tuple(noise_floor(record.recording) for record in records)
@@ -95,7 +95,7 @@ def measure_of(
 
 def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> MeasureChoice:
     """The error measure by force, up to a frequency, without the rule; see `has_motion`."""
-    records = observed_parts(recordings, model.outputs)
+    records = observe_parts(recordings, model.outputs)
     known = place_recorded_effects(model, recordings[0])
     floors = [noise_floor(record.recording) for record in records]
     return _by_force(records, model, floors, (BY_FORCE, *_of_known(known)), band_hz)

@@ -92,7 +92,7 @@ def choose_measure(records: Sequence[Observed], model: MechanicalModel) -> Choic
     if not holds:
         return Choice("windows", DRIFTS)
     if any(
-        _begins_moving(record) and _settling_samples(record, model) > MOST_LEFT_OUT * len(record.command)
+        _begins_moving(record) and _count_settling_samples(record, model) > MOST_LEFT_OUT * len(record.command)
         for record in records
     ):
         return Choice("windows", NOT_AT_REST)
@@ -107,13 +107,13 @@ def is_self_stable(model: MechanicalModel, longest_s: float) -> bool:
 def samples_to_settle(record: Observed, model: MechanicalModel) -> int:
     """Samples to leave out at the beginning, where the recording begins in motion and that takes a short time; 0 =
     none."""
-    after = _settling_samples(record, model)
+    after = _count_settling_samples(record, model)
     if after > MOST_LEFT_OUT * len(record.command) or not _begins_moving(record):
         return 0
     return int(np.ceil(after))
 
 
-def _settling_samples(record: Observed, model: MechanicalModel) -> float:
+def _count_settling_samples(record: Observed, model: MechanicalModel) -> float:
     """Samples until the initial motion has decayed."""
     slowest = _slowest_decay_rate(model)
     return SETTLED_CONSTANTS / slowest * record.recording.sample_rate_hz if slowest > 0 else np.inf

@@ -123,6 +123,6 @@ def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> F
     return rest
 
 
-def predicted_channels(simulated: SimulationResult, count: int) -> FloatArray:
+def predict_channels(simulated: SimulationResult, count: int) -> FloatArray:
     """(n, count): the response and, where `count` includes it, the position."""
     return np.hstack([simulated.response, simulated.position])[:, :count]

@@ -85,7 +85,7 @@ class Hypothesis:
             if not p.fixed
         )
 
-    def placed_effects(self, point: FloatArray | None = None) -> tuple[PlacedEffect, ...]:
+    def list_placed_effects(self, point: FloatArray | None = None) -> tuple[PlacedEffect, ...]:
         """The effects with their values, one per claim and group, as a simulation takes them. point: (k,) coordinates;
         None = the hypothesis's own."""
         left = list(self.parameters)
@@ -105,7 +105,7 @@ class Hypothesis:
     def of_claim(self, number: int) -> tuple[PlacedEffect, ...]:
         """The placed effects of one claim."""
         first = sum(claim.groups for claim in self.claims[:number])
-        return self.placed_effects()[first : first + self.claims[number].groups]
+        return self.list_placed_effects()[first : first + self.claims[number].groups]
 
 
 def has_motion_forces(hypothesis: Hypothesis) -> bool:
@@ -158,7 +158,7 @@ NOTHING = Hypothesis((), (), np.zeros(0))
 def similar_hypotheses(whole: Hypothesis) -> Iterator[Hypothesis]:
     """The hypothesis with other parameters that have almost the same effect, one effect at a time."""
     parameters, begin = whole.parameters, 0
-    for placed in whole.placed_effects():
+    for placed in whole.list_placed_effects():
         end = begin + sum(not p.fixed for p in placed.effect.parameters)
         for other in placed.effect.alike(placed.values):
             point = whole.point.copy()

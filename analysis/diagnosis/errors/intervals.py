@@ -25,7 +25,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted, Sensitivity, residuals_to_fit, take_step
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.noise.periods import settled_periods
+from analysis.diagnosis.noise.periods import find_settled_periods
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
 from equalizer.effects.effect import Structure
 from equalizer.plant.mechanical_model import MechanicalModelError
@@ -54,7 +54,7 @@ def sensitivity_to_all(
 ) -> Sensitivity:
     """Sensitivity (t + parameters, samples) to the model's parameters, then to the hypothesis's parameters, by central
     differences; one-sided at a bound and where the other side gives no valid model."""
-    t, placed = len(deviations), hypothesis.placed_effects()
+    t, placed = len(deviations), hypothesis.list_placed_effects()
     linear = all(isinstance(each.effect.acts, Structure) for each in placed)
     finer = FINER_LINEAR if linear else FINER
 
@@ -63,7 +63,9 @@ def sensitivity_to_all(
         (at if number < t else point)[number if number < t else number - t] += by
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                left = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.placed_effects(point)))
+                left = residuals_to_fit(
+                    measure, measure.residuals(tuning.tune(at), hypothesis.list_placed_effects(point))
+                )
         except (MechanicalModelError, np.linalg.LinAlgError):
             return None
         return left if np.isfinite(left).all() else None
@@ -214,7 +216,7 @@ def _clusters(record: Observed, folded: bool) -> Places:
     a segment is one cluster."""
     width = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
     place = np.arange(len(record.fit))
-    for periods in settled_periods(record.recording) if folded else ():
+    for periods in find_settled_periods(record.recording) if folded else ():
         inside = slice(periods.segment.start, min(periods.segment.stop, len(place)))
         place[inside] = periods.segment.start + (place[inside] - periods.segment.start) % periods.length
     return np.asarray(np.unique(place // width, return_inverse=True)[1])

@@ -4,7 +4,7 @@ Theory of operation. Unknowns are d, the deviations of the model's own parameter
 calibration, and p, the parameters of a hypothesis (scaled to logarithms, starts or units). With the prediction errors e
 in units of the noise,
 
-    J(d, p) = (sum of e(d, p)² + d'd) / N            over the N samples to fit;  |d| <= RETUNING_BOUND,  p within bounds
+    J(d, p) = (sum of e(d, p)² + d'd) / N            over the N samples to fit;  |d| <= Tuning.bound,  p within bounds
 
 d'd is the calibration's prior: a maximum a posteriori estimate. One step solves, with S = [de/dd, de/dp],
 
@@ -27,7 +27,6 @@ from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis, move_point
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.signal import FloatArray
@@ -116,7 +115,7 @@ def sensitivity(
 ) -> Sensitivity:
     """Sensitivity to the model's own parameters by finite differences. map_: `map`, or a parallel one. beside: known
     columns, and the indices of those that must be computed."""
-    base = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.placed_effects()))
+    base = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.list_placed_effects()))
 
     def moved(number: int) -> FloatArray:
         for move in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
@@ -125,7 +124,7 @@ def sensitivity(
             try:
                 with np.errstate(over="ignore", invalid="ignore"):
                     change = base - residuals_to_fit(
-                        measure, measure.residuals(tuning.tune(there), hypothesis.placed_effects())
+                        measure, measure.residuals(tuning.tune(there), hypothesis.list_placed_effects())
                     )
             except (MechanicalModelError, np.linalg.LinAlgError):
                 continue
@@ -159,7 +158,7 @@ def fit(
     return best
 
 
-def expected_gain(gained: float, before: float) -> float:
+def expect_gain(gained: float, before: float) -> float:
     """Share of the cost that the next fit may gain, after `gained` by the last and `before` by the one before it: gains
     shrink about geometrically."""
     return gained * min(gained / before, 1.0) if before > 0 else gained
@@ -167,7 +166,7 @@ def expected_gain(gained: float, before: float) -> float:
 
 def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
     """Residuals and cost of a hypothesis at given deviations, by simulation without fitting."""
-    residuals = measure.residuals(tuning.tune(deviations), hypothesis.placed_effects())
+    residuals = measure.residuals(tuning.tune(deviations), hypothesis.list_placed_effects())
     return Fitted(hypothesis, deviations, residuals, _cost(residuals_to_fit(measure, residuals), deviations))
 
 
@@ -204,7 +203,7 @@ def take_step(
     matrix and right side, of the model's parameters, then the hypothesis's."""
     t = len(from_.deviations)
     now = np.concatenate([from_.deviations, from_.hypothesis.point])
-    low, high = (bound - now for bound in _bounds(from_.hypothesis, t))
+    low, high = (bound - now for bound in _bounds(from_.hypothesis, tuning))
     longest = _longest(from_.hypothesis)
     low[t:], high[t:] = np.maximum(low[t:], -longest), np.minimum(high[t:], longest)
     found, impossible = _first_better(measure, tuning, from_, system, (low, high), dampings)
@@ -230,7 +229,7 @@ def _first_better(
     # Steps that make the model less stable are refused, unless it is unstable already.
     grows = is_unstable_within(tuning.tune(from_.deviations), _longest_s(measure))
     for damping, straight in dampings:
-        step = bounded_step(products + damping * np.diag(np.diagonal(products)), rhs, *bounds)
+        step = solve_bounded_step(products + damping * np.diag(np.diagonal(products)), rhs, *bounds)
         there = move_point(from_.hypothesis, step[t:], straight)
         try:
             model = tuning.tune(from_.deviations + step[:t])
@@ -260,7 +259,7 @@ def hypothesis_sensitivity(
         point, move = from_.hypothesis.point.copy(), moves[number]
         point[number] += move
         with np.errstate(over="ignore", invalid="ignore"):
-            there = measure.residuals(model, from_.hypothesis.placed_effects(point))
+            there = measure.residuals(model, from_.hypothesis.list_placed_effects(point))
             change = errors - residuals_to_fit(measure, there)
             return np.divide(change, move, out=change)
 
@@ -268,9 +267,9 @@ def hypothesis_sensitivity(
     return np.array(columns).reshape(len(moves), len(errors))
 
 
-def _bounds(hypothesis: Hypothesis, tuned: int) -> tuple[FloatArray, FloatArray]:
+def _bounds(hypothesis: Hypothesis, tuning: Tuning) -> tuple[FloatArray, FloatArray]:
     own = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2)
-    widest = np.full(tuned, RETUNING_BOUND)
+    widest = np.full(len(tuning.names), tuning.bound)
     return np.concatenate([-widest, own[:, 0]]), np.concatenate([widest, own[:, 1]])
 
 
@@ -278,7 +277,7 @@ def _longest(hypothesis: Hypothesis) -> FloatArray:
     return np.array([LARGEST_STEPS[free.parameter.scale] for free in hypothesis.parameters])
 
 
-def bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+def solve_bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Least-squares step within bounds: parameters that would leave their range are fixed at its end (active set).
     products, rhs: matrix and right-hand side of the normal equations."""
     step, held = np.zeros(len(rhs)), np.zeros(len(rhs), dtype=bool)
@@ -297,4 +296,4 @@ def bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: F
 
 def gather_evidence(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[Evidence, ...]:
     """Motion and missing force of a fit, one per record, from which starting values are estimated."""
-    return measure.evidence(tuning.tune(fitted.deviations), fitted.hypothesis.placed_effects(), fitted.residuals)
+    return measure.evidence(tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects(), fitted.residuals)

@@ -13,6 +13,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 Part = Literal["all", "test"]
+"""Samples that are predicted: all, or only those to test by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,17 +24,18 @@ class ChannelRms:
     unit: str
     signal: float
     """Standard deviation of the measured signal."""
-    left: float
+    error: float
     """Rms of the prediction error."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictionError:
-    """Errors relative to the signal, root mean square over the channels; None where they are not finite."""
+    """Normalised rms errors: sqrt(mean over channels of (rms error / standard deviation of the signal)²); None where
+    they are not finite."""
 
     error: str
-    """Name of the error measure."""
-    as_it_is: float | None
+    """Name of the error measure, as in `diagnosis.json`."""
+    without_gain: float | None
     """The error of the model without any gain factor."""
     with_gain: float | None
     """The error with one gain factor for all channels, fitted to the samples that are not tested, or to all."""
@@ -42,7 +44,8 @@ class PredictionError:
 
 
 def prediction_error(recording: Recording, model: MechanicalModel, part: Part) -> PredictionError:
-    """Error of a finished model on a recording. model: with its own effects. part: mask of the samples that count."""
+    """Error of a finished model, with its own effects, on a recording. part: the samples that are predicted; of "test",
+    the gain factor is fitted to the other samples."""
     measure = measure_of((recording,), model).measure
     measured, predicted, tested, fitted = [], [], [], []
     for record, left in zip(measure.records, measure.residuals(model, ()), strict=True):
@@ -51,13 +54,14 @@ def prediction_error(recording: Recording, model: MechanicalModel, part: Part) -
         predicted.append(record.measured - left * measure.unit)
         tested.append((record.test if part == "test" else record.test | record.fit | record.choose) & known)
         fitted.append((record.fit | record.choose) & known)
+    # y: measured, f: predicted, (n, c) each.
     y, f = np.vstack(measured), np.vstack(predicted)
     test, fit = np.concatenate(tested), np.concatenate(fitted)
     gain = _gain(y, f, fit if part == "test" and fit.any() else test)
     return PredictionError(
         measure.name,
-        _share(y, f, test),
-        None if gain is None else _share(y, gain * f, test),
+        _normalised_rms(y, f, test),
+        None if gain is None else _normalised_rms(y, gain * f, test),
         tuple(_channels(recording, y[test], f[test])),
     )
 
@@ -80,7 +84,7 @@ def _gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
     return float(predicted @ measured) / power if np.isfinite(power) and power > 0 else None
 
 
-def _share(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
+def _normalised_rms(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
     """Normalised rms error of prediction f of y, (n, c) each: sqrt(mean over channels of (rms error / std of y)²)."""
     if not mask.any():
         return None

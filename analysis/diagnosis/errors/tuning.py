@@ -10,7 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh, null_space
 
-from analysis.diagnosis.settings import UNSTATED_MODES, UNSTATED_SHARE
+from analysis.diagnosis.settings import (
+    AT_RETUNING_BOUND,
+    RETUNING_BOUND,
+    UNSTATED_MODES,
+    UNSTATED_SHARE,
+    WIDER_RETUNING_BOUND,
+)
 from equalizer.plant.effect_vocabulary import MATRIX_UNITS, matrix_unit
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
@@ -33,6 +39,17 @@ class Tuning:
     tune: Callable[[FloatArray], MechanicalModel]
     """The model with its parameters changed by deviations (parameters,), in standard deviations. Raises
     MechanicalModelError where the mass is not positive definite."""
+    bound: float = RETUNING_BOUND
+    """Standard deviations of the calibration by which a parameter may move at most."""
+
+    def with_wider_bound(self) -> "Tuning":
+        """The same parameters with a bound beyond what a calibration allows: of a model that was fitted to the same
+        device with the missing physics in it, whose stated tolerance does not hold that bias."""
+        return replace(self, bound=WIDER_RETUNING_BOUND)
+
+    def is_at_bound(self, deviations: FloatArray) -> bool:
+        """Whether a parameter has moved as far as it may. deviations: (parameters,)"""
+        return bool(np.abs(deviations).max(initial=0.0) >= AT_RETUNING_BOUND * self.bound)
 
     def values(self, deviations: FloatArray) -> FloatArray:
         """(parameters,): deviations, in standard deviations, as changes of the parameters, SI or relative."""
@@ -56,7 +73,7 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
     relative = UNSTATED.modes if tolerance.modes is None else tolerance.modes
     assert relative is not None
     grounded = [
-        _stated_deviation(stated, matrix[:m, :m])
+        _read_stated_deviation(stated, matrix[:m, :m])
         for stated, matrix in (
             (tolerance.mass_kg, split.mass),
             (tolerance.damping_n_s_per_m, split.damping),
@@ -89,7 +106,7 @@ class _Split:
     frequency_hz: FloatArray
 
 
-def _stated_deviation(stated: float | None, grounded: FloatArray) -> float:
+def _read_stated_deviation(stated: float | None, grounded: FloatArray) -> float:
     if stated is not None:
         return stated
     return UNSTATED_SHARE * float(np.abs(np.diagonal(grounded)).max()) or UNSTATED_SHARE

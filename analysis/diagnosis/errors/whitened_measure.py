@@ -20,7 +20,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 
-from analysis.diagnosis.data.correlated_residuals import lagged_products
+from analysis.diagnosis.data.correlated_residuals import compute_lagged_products
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.types import Mask
@@ -69,9 +69,9 @@ def whitening_filter(residuals: Sequence[FloatArray], least: FloatArray) -> Whit
     known. least: (c,), rms of white noise in the residuals' unit, which bounds the spectrum from below."""
     count = sum(int(np.isfinite(residual).all(axis=1).sum()) for residual in residuals)
     lags = int(np.clip(count // SAMPLES_PER_LAG, 1, MOST_LAGS))
-    autocovariance: FloatArray = np.sum([lagged_products(residual, lags) for residual in residuals], axis=0) / max(
-        count, 1
-    )
+    autocovariance: FloatArray = np.sum(
+        [compute_lagged_products(residual, lags) for residual in residuals], axis=0
+    ) / max(count, 1)
     autocovariance[0] = autocovariance[0] * (1 + FLAT) + least**2
     coefficients = np.zeros((lags + 1, len(least)))
     coefficients[0] = 1.0

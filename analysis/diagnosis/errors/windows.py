@@ -15,7 +15,7 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
 from analysis.diagnosis.errors.error_measure_rule import WINDOW_S
 from analysis.diagnosis.errors.evidence_from_residuals import without_gaps
-from analysis.diagnosis.errors.free_simulation import predicted_channels
+from analysis.diagnosis.errors.free_simulation import predict_channels
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
 from equalizer.effects.simulation.along_motion import actuator_force
 from equalizer.effects.simulation.bodies import Restarts, bodies_of
@@ -102,7 +102,7 @@ class Windows:
             Restarts(length * np.arange(len(states)), states),
         )
         with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-            residual = (record.measured - predicted_channels(simulated, record.measured.shape[1])) / self.unit
+            residual = (record.measured - predict_channels(simulated, record.measured.shape[1])) / self.unit
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure

@@ -111,6 +111,8 @@ def _share(columns: Sequence[FloatArray], left: Sequence[FloatArray]) -> float:
 def _fit_structures(
     given: BalancedRecordings | None, recordings: Sequence[Recording], on_progress: Callable[[float], None]
 ) -> tuple[list[StructureFit], tuple[TriedStructure, ...]]:
+    """Fit every structure that the recordings allow. given: for force balances; None where only spectra can be
+    fitted."""
     kinds: tuple[Kind, ...] = ("mass-spring", "two-mode") if given is None else ("massless", "motor", "mass-spring")
     kinds = ("motor", "mass-spring") if given is not None and given.free else kinds
     fits, tried = [], []
@@ -126,7 +128,8 @@ def _fit_structures(
 
 
 def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Callable[[float], None]) -> Choice:
-    """The choice, or two-mode where a free simulation of held-out samples favours it."""
+    """The choice; a structure with two modes in its place where that leaves less, by `MODES_GAIN`, in a free simulation
+    of held-out samples."""
     if plain.fit.kind != "mass-spring":
         return plain
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
@@ -147,7 +150,7 @@ def _with_modes(plain: Choice, recordings: Sequence[Recording], on_progress: Cal
     if errors[1] < (1 - MODES_GAIN) * errors[0]:
         tried = (*plain.tried, TriedStructure("two-mode", other.error, ""))
         return Choice(other, tried, text, remains(None, other))
-    return _with_tried(plain, TriedStructure("two-mode", other.error, "modes take too little off"), text)
+    return _with_tried(plain, TriedStructure("two-mode", other.error, "modes lower the error too little"), text)
 
 
 def _with_tried(plain: Choice, tried: TriedStructure, text: str = "") -> Choice:

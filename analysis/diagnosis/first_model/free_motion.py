@@ -14,7 +14,7 @@ import numpy as np
 from analysis.diagnosis.balance.band import band_end_hz
 from analysis.diagnosis.balance.motion import differentiate
 from analysis.diagnosis.data.measured_motion import FREE, fill_gaps, is_driven, is_quasi_static
-from analysis.diagnosis.data.observed import moving_spans
+from analysis.diagnosis.data.observed import find_moving_spans
 from analysis.diagnosis.data.observed_parts import parts_of
 from analysis.diagnosis.settings import DECAY_LEAST_CYCLES, DECAY_MOST_LEVELS
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -65,7 +65,7 @@ def _levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:
     """Stretches of some cycles each: as it decays, the motion passes through all levels, and each is used for fit and
     test. samples: (n, p)."""
     found = []
-    for span in moving_spans(samples, parts_of(recording)):
+    for span in find_moving_spans(samples, parts_of(recording)):
         moving = samples[span.start : span.end_of_motion]
         away = moving[:, int(np.argmax(np.ptp(moving, axis=0)))]
         rest = float(np.median(samples[span.start : span.stop, int(np.argmax(np.ptp(moving, axis=0)))]))

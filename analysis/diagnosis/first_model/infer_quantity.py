@@ -14,7 +14,7 @@ import numpy as np
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.data.measured_motion import is_driven
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import DERIVATIVE_NEEDED
 from analysis.wording import conjoin
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
@@ -76,7 +76,7 @@ def _likely_quantity(recordings: Sequence[Recording]) -> str:
     count = len(recordings[0].response.channels)
     taken = [replace(_with_quantity(each, "position"), position=None) for each in recordings]
     try:
-        motions = motions_of(observed_parts(taken, count))
+        motions = motions_of(observe_parts(taken, count))
         regression = regression_of(motions, 0, (), turns=False)
     except (NoMotionError, np.linalg.LinAlgError):
         return "position"

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtrit
 
-from analysis.diagnosis.balance.blocks import Block, block_products, squared_error
+from analysis.diagnosis.balance.blocks import Block, block_products, compute_squared_error
 from analysis.diagnosis.balance.judge_laws import held_out_moves
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression, regression_of, signal_power
@@ -135,7 +135,7 @@ def _errors(blocks: Sequence[Sequence[Block]], shape: _Parametrisation, numbers:
     return np.array(
         [
             [
-                squared_error(block_products(block, shape.columns), row @ weights, block.power)
+                compute_squared_error(block_products(block, shape.columns), row @ weights, block.power)
                 for block, row in zip(each, shape.rows, strict=True)
             ]
             for each, weights in zip(zip(*blocks, strict=True), numbers, strict=True)

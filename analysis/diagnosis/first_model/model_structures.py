@@ -10,7 +10,7 @@ from analysis.diagnosis.balance.law import scales_of
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.data.measured_motion import is_read_as_free, time_unit
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, joint_fit, regressions_of
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
 from analysis.wording import as_sentence
@@ -90,7 +90,7 @@ class BalancedRecordings:
 def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
     """The regressions of all axes. Raises NoMotionError where forces cannot be balanced along a measured motion."""
     first = recordings[0]
-    motions = motions_of(observed_parts(recordings, len(first.response.channels)))
+    motions = motions_of(observe_parts(recordings, len(first.response.channels)))
     count = len(first.command.channels)
     if motions[0].order == 2:
         raise NoMotionError("only accelerations were measured")

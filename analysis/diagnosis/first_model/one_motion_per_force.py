@@ -9,7 +9,7 @@ import numpy as np
 from analysis.diagnosis.balance.friction_laws import SHARP
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, motions_of
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.free_motion import read_free_motion
 from analysis.diagnosis.first_model.infer_quantity import name_motion
 from analysis.diagnosis.first_model.restore_sign import restore_sign
@@ -178,7 +178,7 @@ def _sum(signal: Signal, gains: FloatArray, main: int) -> Signal:
 
 def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
     """Gains (m,) of the commands, relative to the strongest one, and its number."""
-    motions = motions_of(observed_parts(recordings, 1))
+    motions = motions_of(observe_parts(recordings, 1))
     rows, aims = [], []
     for motion in motions:
         rubbing = smooth_sign(motion.velocity, SHARP * max(float(motion.velocity.std()), 1e-300))

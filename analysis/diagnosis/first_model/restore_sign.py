@@ -33,7 +33,7 @@ def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
     for recording in recordings:
         amount = recording.response.samples[:, 0]
         signed, left = _find_signs(recording.command.samples[:, 0], amount)
-        plain = _unexplained_share(recording.command.samples[:, 0], amount)
+        plain = _compute_unexplained_share(recording.command.samples[:, 0], amount)
         if left > 1 - SIGNED_SPEED_FITS or left > SIGNED_SPEED_BETTER * plain:
             return recordings, ""
         found.append(replace(recording, response=replace(recording.response, samples=signed[:, None])))
@@ -75,7 +75,7 @@ def _find_signs(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, fl
     return best, float(np.sum((best - _predict_speed(rows, best)) ** 2) / np.sum(best**2))
 
 
-def _unexplained_share(command: FloatArray, amount: FloatArray) -> float:
+def _compute_unexplained_share(command: FloatArray, amount: FloatArray) -> float:
     rows, flat = _rows(command), amount - amount.mean()
     return float(np.sum((flat - _predict_speed(rows, flat)) ** 2) / np.sum(amount**2))
 

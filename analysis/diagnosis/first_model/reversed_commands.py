@@ -18,7 +18,7 @@ from analysis.diagnosis.balance.motion import Motion, NoMotionError, motions_of
 from analysis.diagnosis.balance.regression import regression_of
 from analysis.diagnosis.balance.structures import Structure, is_better
 from analysis.diagnosis.data.measured_motion import all_as_force_driven, is_read_as_free
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.recorded_conditions import REVERSED
 from analysis.diagnosis.settings import REVERSED_SIGN_GAIN
 from analysis.wording import conjoin
@@ -34,7 +34,7 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     driven = all_as_force_driven(recordings)
     count = len(driven[0].command.channels)
     try:
-        motions = motions_of(observed_parts(driven, len(driven[0].response.channels)))
+        motions = motions_of(observe_parts(driven, len(driven[0].response.channels)))
         if len(motions[0].channels) != count:
             return recordings, ""
         against = [axis for axis in range(count) if _is_reversed(motions, axis)]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.measured_motion import MeasuredMotion, measured_motion
+from analysis.diagnosis.data.measured_motion import MeasuredMotion, choose_measured_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.forces.inverse_dynamics import band_motion
 from analysis.diagnosis.forces.inverse_response import inverse_response
@@ -54,7 +54,9 @@ def force_views(
 ) -> ForceViews:
     """The error measure by forces along the measured motion, with its noise. records: with motion, see `has_motion`.
     band_hz: up to which forces are compared; None = by the noise."""
-    motions = [measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)]
+    motions = [
+        choose_measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)
+    ]
     applied = [
         actuator_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
         for record in records

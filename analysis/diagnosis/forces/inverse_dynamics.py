@@ -58,7 +58,7 @@ def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> 
     return BandMotion(position, sample_rate_hz, band_hz, (x, v, a), (mean_x, mean_v, mean_a))
 
 
-def required_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
+def compute_required_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
     """Mean of the required force over one sample period around each instant, without actuator, sensor and effects.
 
     Raises numpy.linalg.LinAlgError where the first m outputs do not determine the model's motion."""

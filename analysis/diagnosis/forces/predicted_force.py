@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
-from analysis.diagnosis.forces.inverse_dynamics import BandMotion, RequiredForce, band_motion, required_force
+from analysis.diagnosis.forces.inverse_dynamics import BandMotion, RequiredForce, band_motion, compute_required_force
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
 from equalizer.effects.simulation.along_motion import actuator_force, force_along
 from equalizer.effects.simulation.bodies import bodies_of
@@ -93,7 +93,9 @@ class PredictedForce:
         structure = bodies_of(
             model, [effect for effect in effects if isinstance(effect.effect.acts, Structure)]
         ).structure
-        required = self._remember("required", number, (structure, motion), lambda: required_force(structure, motion))
+        required = self._remember(
+            "required", number, (structure, motion), lambda: compute_required_force(structure, motion)
+        )
         applied = self._actuator_force(model, effects, number)
         next_force = np.concatenate([required.force[1:], required.force[-1:]])
         axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration

@@ -9,9 +9,9 @@ import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
 from analysis.diagnosis.data.measured_motion import has_motion
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.forces.force_views import force_views
-from analysis.diagnosis.forces.inverse_dynamics import required_force
+from analysis.diagnosis.forces.inverse_dynamics import compute_required_force
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.noise_floor import noise_floor
 from analysis.diagnosis.settings import MASSLESS_SHARE, RIGID_MASS_SHARE, RIGID_SHARE, SPRING_SHARE
@@ -39,7 +39,7 @@ def rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
     """Least-squares model with one body per command. Raises MechanicalModelError where the forces give no positive
     mass."""
     model = _unit_masses(recordings[0], name)
-    records = observed_parts(recordings, model.outputs)
+    records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
         raise MechanicalModelError(("neither positions nor velocities were measured",))
     floors = [noise_floor(record.recording) for record in records]
@@ -65,7 +65,7 @@ def _unit_masses(recording: Recording, name: str) -> MechanicalModel:
 def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
     rows, aims = [], []
     for record, motion in zip(measure.records, measure.motions, strict=True):
-        motion_and_force = required_force(model, motion)
+        motion_and_force = compute_required_force(model, motion)
         used = record.fit | record.choose
         columns = (
             motion_and_force.axis_acceleration,

@@ -1,5 +1,15 @@
-"""Block permutation test: blocks are longer than the correlation time, so that neighbouring samples do not count as
-independent."""
+"""Block permutation test: whether a statistic of correlated series exceeds what chance gives.
+
+Exchanging single samples would count neighbouring, correlated samples as independent. Blocks of three correlation times
+are exchanged instead, which leaves the correlation within a block as it is. The p-value is the share of permutations
+whose statistic is at least the observed one. A p-value below some ten over the number of permutations cannot be
+counted: there the upper tail of a gamma distribution with the mean m and variance v of the permuted statistics is used,
+
+    P(T >= t) = Q(m²/v, t m/v),      Q the regularised upper incomplete gamma function.
+
+References: Winkler, Ridgway, Douaud, Nichols and Smith, NeuroImage 141 (2016) 502 (gamma tail); Bartlett, J. Royal
+Stat. Soc. 98 (1935) 536 (correlation time).
+"""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -12,18 +22,19 @@ from equalizer.signals.signal import FloatArray
 
 IntArray = npt.NDArray[np.int64]
 _CORRELATION_TIMES = 3.0
-"""Length of a block, in correlation times."""
+"""Length of a block, in correlation times. By hand."""
 _LEAST_EXCEEDED = 10
-"""Number of permutations with a larger statistic from which the p-value is counted instead of fitted."""
+"""Number of permutations with a larger statistic above which the p-value is counted instead of fitted. By hand."""
 SMALLEST = 1e-6
-"""Least p-value: the fitted tail is not trusted below it."""
+"""Least p-value: the fitted tail is not trusted below it. By hand."""
 _LEAST_BLOCKS = 8
-"""Least number of blocks per stratum."""
+"""Least number of blocks per stratum; in a short stratum blocks are shorter for it. By hand."""
 
 
 def correlation_time(series: FloatArray) -> float:
-    """Correlation time of a series (n,) in samples: 1 + twice the sum of the squared autocorrelation, the factor by
-    which a variance is inflated."""
+    """Correlation time of a series (n,) in samples, at least about 1: 1 + 2 sum over k >= 1 of r_k², r_k the
+    autocorrelation at lag k up to n / 4. By this factor the correlation inflates the variance of a product's mean of
+    two such series (Bartlett). 1 for a constant series."""
     n = len(series)
     centred = series - series.mean()
     spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
@@ -36,7 +47,9 @@ def correlation_time(series: FloatArray) -> float:
 
 
 def shuffle_blocks(strata: IntArray, block: int, random: np.random.Generator) -> IntArray:
-    """Indices (n,) that exchange blocks within each stratum, cut from a random offset on. strata: (n,), contiguous."""
+    """Indices (n,) of a random exchange of blocks within each stratum. Blocks are cut from a random offset on, the
+    stratum taken as a ring; the rest that fills no block stays at its end. strata: (n,), label of each sample's
+    stratum, contiguous. block: length in samples."""
     every, order = np.arange(len(strata)), np.empty(len(strata), dtype=np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(strata)) + 1, [len(strata)]])
     for start, stop in pairwise(edges.tolist()):
@@ -65,8 +78,8 @@ def permutation_p_values(
     permutations: int,
     random: np.random.Generator,
 ) -> FloatArray:
-    """(tests,): upper tails of a gamma distribution with the mean and variance of the permutations (Winkler and others
-    2016), or counted, whichever applies. statistics: from permuted indices to statistics (tests,)."""
+    """p-values (tests,) of the observed statistics, counted or from the fitted gamma tail (see the module). statistics:
+    from indices (n,) to statistics (tests,), larger where the null hypothesis is less likely, not negative."""
     observed = statistics(np.arange(len(strata)))
     chance = np.array([statistics(shuffle_blocks(strata, block, random)) for _ in range(permutations)])
     mean, variance = chance.mean(axis=0), np.maximum(chance.var(axis=0, ddof=1), np.finfo(np.float64).tiny)

@@ -4,7 +4,7 @@ channel, input, level and band. `Distortions.remarks` names the kinds that the r
 Theory of operation. A linear, time-invariant device responds to a multisine on its driven lines only. Where all of
 these are odd multiples k f0, a term of odd order in the motion (friction, backlash, a cubic spring) makes sums and
 differences of an odd number of odd lines, which are odd; a term of even order makes even lines. So the response's power
-on driven multiples that were left silent, beyond the noise, is the distortion, and its parity tells the kind. Some odd
+on driven multiples that were left silent, beyond the noise, is the distortion, and its parity shows the kind. Some odd
 lines must be left out of the excitation for that (detection lines). Per kind and band, over the silent lines S,
 
     D² = 2 L/|S| sum_S (|Y(k)|² - E|N(k)|²)     Y: mean over periods, N: its noise, L: lines that the kind reaches
@@ -35,7 +35,7 @@ from analysis.diagnosis.data.spectral_lines import (
 )
 from analysis.diagnosis.localisation.segment_spectra import SegmentSpectrum, segment_spectra
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods
+from analysis.diagnosis.noise.periods import Periods, find_settled_periods, period_spectra
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording
@@ -97,7 +97,7 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
     floor: the recording's noise; where it is not known, no cell is evaluated and a remark says so."""
     if not floor.known:
         return Distortions((), ("The noise is not known, so no distortion can be told from it.",))
-    found = settled_periods(recording)
+    found = find_settled_periods(recording)
     excitation = instrument_signal(recording)
     held = hold_length(excitation)
     lines = [detection_lines(period_spectra(excitation, period).mean(axis=0), held) for period in found]

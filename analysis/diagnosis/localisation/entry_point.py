@@ -33,10 +33,10 @@ _BLOCK_LINES = 8
 _TINY = np.finfo(np.float64).tiny
 
 
-# A mismatch of the response without one of the position belongs to the response sensor: a force would move both.
 @dataclass(frozen=True, slots=True)
 class SensorRule:
-    """Comparison of the position's residual with the motion that the response's residual would mean if it were real."""
+    """Comparison of the position's residual with the motion that the response's residual would mean if it were real: a
+    force would move both, so that a residual of the response alone is an error of its sensor."""
 
     verdict: Literal["response sensor", "motion", "undecided"]
     expected: float
@@ -123,27 +123,27 @@ def entry_point(
     whitened = spectra.residual / np.sqrt(np.maximum(spectra.noise, _TINY))
     total = np.sum(np.abs(whitened) ** 2, axis=2)
     channels = whitened.shape[2]
-    loud = total / channels > ENTRY_LOUD
+    above_noise = total / channels > ENTRY_LOUD
     rule = None if derivative is None else sensor_rule(spectra, derivative)
-    if not loud.any() or not entries:
-        return EntryPoint((), rule, int(loud.sum()))
+    if not above_noise.any() or not entries:
+        return EntryPoint((), rule, int(above_noise.sum()))
     weights = 1 / np.sqrt(np.maximum(spectra.noise.mean(axis=0), _TINY))
     bases = [_basis(entry, weights) for entry in entries]
-    lefts = [_unexplained_power(whitened, total, basis) for basis in bases]
+    lefts = [_compute_unexplained_power(whitened, total, basis) for basis in bases]
     logs = [np.log1p(left / max(channels - basis.shape[2], 1)) for left, basis in zip(lefts, bases, strict=True)]
-    scores = [float(np.mean(log[loud])) for log in logs]
+    scores = [float(np.mean(log[above_noise])) for log in logs]
     ranked = sorted(range(len(entries)), key=lambda k: scores[k] + _score_penalty(rule, entries[k], bases[k].shape[2]))
     best = ranked[0]
     ranking = []
     for k in ranked:
         alike = tuple(entries[j].name for j in ranked if j != k and _angle(bases[j], bases[k]) < ENTRY_ANGLE)
         same = k == best or entries[best].name in alike
-        p_value = 1.0 if same else _p_value_as_good(logs[k], logs[best], loud)
-        explained = 1 - lefts[k][loud] / total[loud]
+        p_value = 1.0 if same else _p_value_as_good(logs[k], logs[best], above_noise)
+        explained = 1 - lefts[k][above_noise] / total[above_noise]
         entry = entries[k]
         share = float(np.median(explained))
         ranking.append(EntryScore(entry.name, entry.place, entry.axis, scores[k], share, p_value, alike))
-    return EntryPoint(tuple(ranking), rule, int(loud.sum()))
+    return EntryPoint(tuple(ranking), rule, int(above_noise.sum()))
 
 
 def _basis(entry: Entry, weights: FloatArray) -> ComplexArray:
@@ -157,7 +157,7 @@ def _basis(entry: Entry, weights: FloatArray) -> ComplexArray:
     return np.asarray(np.linalg.qr(directions / np.maximum(size, _TINY))[0], dtype=np.complex128)
 
 
-def _unexplained_power(whitened: ComplexArray, total: FloatArray, basis: ComplexArray) -> FloatArray:
+def _compute_unexplained_power(whitened: ComplexArray, total: FloatArray, basis: ComplexArray) -> FloatArray:
     """(experiments, lines)"""
     along = np.einsum("lck,elc->elk", basis.conj(), whitened)
     return np.asarray(np.maximum(total - np.sum(np.abs(along) ** 2, axis=2), 0.0))
@@ -182,9 +182,11 @@ def _angle(first: ComplexArray, other: ComplexArray) -> float:
     return float(np.mean(np.sqrt(np.maximum(1 - cosines**2, 0.0))))
 
 
-def _p_value_as_good(log: FloatArray, best: FloatArray, loud: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> float:
+def _p_value_as_good(
+    log: FloatArray, best: FloatArray, above_noise: np.ndarray[tuple[int, int], np.dtype[np.bool_]]
+) -> float:
     """One-sided paired t-test over blocks of neighbouring lines with enough power."""
-    difference = (log - best)[loud]
+    difference = (log - best)[above_noise]
     blocks = len(difference) // _BLOCK_LINES
     if blocks < 3:
         return 1.0

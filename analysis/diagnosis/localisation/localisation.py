@@ -79,11 +79,11 @@ def find_tied_states(
     return force_states(evidence, recording, cells, tuning.model.system)
 
 
-# Where a mismatch can enter a given model: as a force along an axis, or as an error of a sensor.
 def possible_entries(
     model: MechanicalModel, recording: Recording, frequency_hz: FloatArray, position: bool
 ) -> tuple[Entry, ...]:
-    """Entries at which a mismatch may enter the model. frequency_hz: (lines,). position: whether the position's
+    """Entries at which a mismatch may enter the model: a force along an axis, forces along several, or an error of a
+    sensor. frequency_hz: (lines,). position: whether the position's
     channels are compared beside the response's."""
     transfer = axis_transfer(model, recording.sample_rate_hz, frequency_hz)
     forces = np.concatenate([transfer.response, transfer.position], axis=1) if position else transfer.response

@@ -142,12 +142,15 @@ def _cell(group: Sequence[ResidualLines], k: int, name: str, observation: Observ
         for what in ("residual", "noise", "signal")
     )
     ratio = float(np.average([part.whitened[k] for part in group], weights=lines))
-    loud, freedom = sum(float(part.signal_to_noise[k]) for part in group), max(float(observation.noise.freedom[k]), 1.0)
-    p_value = float(noncentral_f_sf(ratio, lines.sum(), freedom, 2 * allowed**2 * loud))
+    over_noise, freedom = (
+        sum(float(part.signal_to_noise[k]) for part in group),
+        max(float(observation.noise.freedom[k]), 1.0),
+    )
+    p_value = float(noncentral_f_sf(ratio, lines.sum(), freedom, 2 * allowed**2 * over_noise))
     return MismatchCell(
         name, quantity, first.input, first.band_hz, first.amplitude,
         float(np.sqrt(max(residual - noise, 0.0))), float(np.sqrt(signal)), float(np.sqrt(ratio)),
-        allowed, p_value, 1.0, float(seconds.sum()), float(lines.sum()), freedom, loud / float(lines.sum()),
+        allowed, p_value, 1.0, float(seconds.sum()), float(lines.sum()), freedom, over_noise / float(lines.sum()),
     )  # fmt: skip
 
 
@@ -170,11 +173,12 @@ def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
     return CleanFloor({key: beyond * share for key, share in shares.items()}, recordings=len(clean))
 
 
-# Hierarchical multiple testing: the false discovery rate is controlled family by family. Families nest (channel, then
-# band, then cell). A family's own p-value is Simes' of its members. Members are tested only where their family was
-# found, at a level lowered by the share of families that were found (Benjamini and Bogomolov 2014).
 def adjust_nested_p_values(p_values: FloatArray, families: Sequence[tuple[Hashable, ...]], level: float) -> FloatArray:
     """Adjusted p-values (tests,): found are those up to `level`.
+
+    Hierarchical multiple testing: the false discovery rate is controlled family by family. Families nest (channel, then
+    band, then cell). A family's own p-value is Simes' of its members. Members are tested only where their family was
+    found, at a level lowered by the share of families that were found (Benjamini and Bogomolov 2014).
 
     families: one path per test, widest family first; paths of equal length. The test is the last, innermost member.
     """

@@ -1,5 +1,9 @@
-"""Power spectrum of the residual, segment by segment: of the mean period where periods
-repeat, of overlapping windows elsewhere (Welch)."""
+"""Power spectrum of the residual, by segment and octave.
+
+Where periods repeat: the spectrum of their mean, whose lines are independent. Elsewhere: Hann windows that overlap by
+half (Welch 1967); their correlation reduces the degrees of freedom. Powers are mean squares in the signal's unit
+squared, one-sided: twice the squared magnitudes of the lines of positive frequency.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +19,7 @@ from analysis.diagnosis.data.spectral_lines import (
     octaves_between,
 )
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
-from analysis.diagnosis.noise.periods import Periods, mean_spectrum, settled_periods
+from analysis.diagnosis.noise.periods import Periods, find_settled_periods, mean_spectrum
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording, Segment
@@ -23,16 +27,19 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import hann, line_spectra
 
 _WINDOW_S = 1.0
-"""Length of a window where nothing is periodic."""
+"""Length of a window where nothing is periodic (s). By hand."""
 _DRIVEN_IN_BAND = 1e-4
-"""Share of the strongest band's power of the command below which a band is not driven."""
+"""Share of the strongest band's power of the command below which a band is not driven. By hand."""
 _DRIVEN_IN_WINDOW = 1e-2
-"""Share of its band's strongest window below which a window does not count for the band."""
+"""Share of its band's strongest window below which a window does not count for the band. By hand."""
 _HANN_NEIGHBOURS = 1.944
-"""1 + 2 (4/9 + 1/36): factor by which the correlation of neighbouring lines of a Hann window reduces the degrees of
-freedom."""
+"""1 + 2 (4/9 + 1/36): factor by which the correlation of neighbouring lines of a Hann window, 2/3 and 1/6, reduces the
+degrees of freedom."""
 _HANN_OVERLAP = 1.056
-"""1 + 2/36: the same for windows that overlap by half."""
+"""1 + 2/36: the same for windows that overlap by half, whose correlation is 1/6."""
+_LEAST_AMPLITUDE = 0.1
+"""Least amplitude of a channel, relative to the strongest of its quantity, by hand: the response of a channel that is
+hardly driven depends on fractions of a degree of misalignment, so the strongest is the reference."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,38 +74,35 @@ class Observation:
     predicted: FloatArray
     noise: ChannelNoise
     noise_hz: FloatArray
+    """Frequencies of the noise's spectral density (Hz)."""
     quantities: tuple[str, ...]
-
-
-_LEAST_AMPLITUDE = 0.1
-"""Least amplitude of a channel, relative to the strongest of its quantity: the response of a channel that is hardly
-driven depends on fractions of a degree of misalignment, so the strongest is the reference."""
 
 
 def residual_lines(recording: Recording, observation: Observation, used: Mask) -> list[ResidualLines]:
     """Residual power by segment and band. used: (n,), the samples that count. Segments without a complete period or
     window are left out."""
-    whole = used & np.isfinite(observation.measured).all(axis=1) & np.isfinite(observation.predicted).all(axis=1)
-    periods = {period.index: period for period in settled_periods(recording)}
+    usable = used & np.isfinite(observation.measured).all(axis=1) & np.isfinite(observation.predicted).all(axis=1)
+    periods = {period.index: period for period in find_settled_periods(recording)}
     left = observation.measured - observation.predicted
     found: list[ResidualLines] = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
         if segment.kind == "rest":
             continue
         if index in periods:
-            starts = tuple(s for s in periods[index].starts if whole[s : s + segment.period].all())
+            starts = tuple(s for s in periods[index].starts if usable[s : s + segment.period].all())
             if starts:
                 found += _lines_of_periods(
                     recording, observation, left, Periods(index, segment, starts, periods[index].settled)
                 )
         else:
-            found += _lines_of_windows(recording, observation, left, (segment, whole))
+            found += _lines_of_windows(recording, observation, left, (segment, usable))
     return found
 
 
 def _lines_of_periods(
     recording: Recording, observation: Observation, left: FloatArray, periods: Periods
 ) -> list[ResidualLines]:
+    """Residual power of the mean period, by octave. left: residual (n, channels)."""
     excitation = mean_spectrum(instrument_signal(recording), periods)
     driven = detection_lines(excitation, hold_length(instrument_signal(recording)))
     if driven is None:
@@ -123,10 +127,12 @@ def _lines_of_periods(
 def _lines_of_windows(
     recording: Recording, observation: Observation, left: FloatArray, where_used: tuple[Segment, Mask]
 ) -> list[ResidualLines]:
-    segment, whole = where_used
+    """Residual power of Hann windows, by octave. left: residual (n, channels). where_used: the segment, and the mask
+    (n,) of samples that count."""
+    segment, usable = where_used
     length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
     starts = [
-        s for s in range(segment.start, segment.stop - length + 1, max(length // 2, 1)) if whole[s : s + length].all()
+        s for s in range(segment.start, segment.stop - length + 1, max(length // 2, 1)) if usable[s : s + length].all()
     ]
     command = instrument_signal(recording)[segment.start : segment.stop]
     if length < 16 or not starts or not np.isfinite(command).all():
@@ -163,15 +169,16 @@ def _lines_of_windows(
 
 
 def _window_power(samples: FloatArray, starts: Sequence[int], length: int) -> FloatArray:
-    """(windows, lines, channels)"""
+    """Squared magnitudes (windows, lines, channels) of windows without their mean, times a Hann window of unit
+    power."""
     window = np.sqrt(8 / 3) * hann(length)
     periods = np.stack([samples[start : start + length] for start in starts])
     return np.abs(line_spectra((periods - periods.mean(axis=1, keepdims=True)) * window[:, None])) ** 2
 
 
 def _noise_power(observation: Observation, lines_hz: FloatArray, periods: int) -> FloatArray:
-    """Noise power times length, of the mean of `periods` periods; the repeating part of rounding does not average
-    out."""
+    """(lines, channels): noise power of a line times the length, for a mean of `periods` periods. The part of rounding
+    that repeats in every period does not average out."""
     density = np.stack(
         [np.interp(lines_hz, observation.noise_hz, channel) for channel in observation.noise.density.T], axis=1
     )
@@ -185,24 +192,25 @@ def _sum_lines(
     response: FloatArray,
     quantities: tuple[str, ...],
 ) -> ResidualLines:
-    """residual, noise, response: (lines, channels) squared magnitudes of a one-sided spectrum."""
+    """The powers summed over lines. where: input, amplitude, band (Hz), duration (s) and number of independent lines.
+    residual, noise, response: (lines, channels), squared magnitudes of the lines of positive frequency."""
     signal = np.maximum(response - noise, 0.0)
-    loudest = np.stack([signal[:, [q == own for q in quantities]].max(axis=1) for own in quantities], axis=1)
-    heard = np.maximum(signal, _LEAST_AMPLITUDE**2 * loudest)
-    quiet = np.maximum(noise, np.finfo(np.float64).tiny)
+    strongest = np.stack([signal[:, [q == own for q in quantities]].max(axis=1) for own in quantities], axis=1)
+    raised = np.maximum(signal, _LEAST_AMPLITUDE**2 * strongest)
+    positive_noise = np.maximum(noise, np.finfo(np.float64).tiny)
     lines = where[4]
     return ResidualLines(
         *where,
         2 * residual.sum(axis=0),
         2 * noise.sum(axis=0),
-        2 * heard.sum(axis=0),
-        np.mean(residual / quiet, axis=0),
-        lines * np.mean(heard / quiet, axis=0),
+        2 * raised.sum(axis=0),
+        np.mean(residual / positive_noise, axis=0),
+        lines * np.mean(raised / positive_noise, axis=0),
     )
 
 
 def _per_window(summed: ResidualLines, windows: int) -> ResidualLines:
-    """Mean squares are those of a mean window."""
+    """The sums over all windows divided by their number: mean squares of a window."""
     return ResidualLines(
         summed.input, summed.amplitude, summed.band_hz, summed.seconds, summed.lines,
         summed.residual / windows, summed.noise / windows, summed.signal / windows,

@@ -9,7 +9,7 @@ from analysis.diagnosis.data.spectral_lines import detection_lines, hold_length
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.noise.periods import Periods, period_spectra, settled_periods
+from analysis.diagnosis.noise.periods import Periods, find_settled_periods, period_spectra
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording, Segment
@@ -53,7 +53,9 @@ def residual_spectra(
     residual = np.hstack(left)
     whole = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
     segments = [
-        period for period in (_whole_periods(periods, whole) for periods in settled_periods(recording)) if period.starts
+        period
+        for period in (_whole_periods(periods, whole) for periods in find_settled_periods(recording))
+        if period.starts
     ]
     if not segments:
         segments = _windows(recording, whole)

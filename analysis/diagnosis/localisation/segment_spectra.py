@@ -65,8 +65,10 @@ def segment_spectra(
         for (period, lines), command, answer in zip(alike, commands, answers, strict=True):
             mean, error, spread = _mean_and_errors(answer, floor, noise.rounding / length)
             if linear is not None:
-                brought, doubt = command_contribution(linear, np.where(lines.driven[:, None], 0, command))
-                mean, error = mean - brought, error + doubt
+                contribution, contribution_error = command_contribution(
+                    linear, np.where(lines.driven[:, None], 0, command)
+                )
+                mean, error = mean - contribution, error + contribution_error
             spectrum = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
             found.append(SegmentSpectrum(inputs_of(recording, period), period.segment.amplitude, *spectrum))
     return found
@@ -103,11 +105,11 @@ def _linear_response(
     return None if clean else interpolate_response(line_responses(driven, [answer.mean(axis=0) for answer in answers]))
 
 
-# The command's content on silent lines: under feedback the device's distortion returns through the command,
-# and a linear device responds to it, too.
 def line_responses(commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]) -> ComplexArray:
     """(lines, outputs, inputs): the linear response at lines where the experiments drive every direction; NaN
-    elsewhere. commands: each (lines, inputs), zero where not driven; responses: each (lines, outputs)."""
+    elsewhere. commands: each (lines, inputs), zero where not driven; responses: each (lines, outputs). With it the part
+    of the response is subtracted that the command causes on silent lines: under feedback distortion returns through the
+    command."""
     inputs, outputs = np.stack(commands, axis=1), np.stack(responses, axis=1)
     size = np.linalg.svd(inputs, compute_uv=False)
     usable = (inputs.shape[1] >= inputs.shape[2]) & (size[:, -1] > _LEAST_INDEPENDENCE * size[:, 0])
@@ -132,5 +134,5 @@ def interpolate_response(response: ComplexArray) -> ComplexArray | None:
 
 def command_contribution(response: ComplexArray, command: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     """Linear response to the command's lines, and the variance of its error: both (lines, outputs)."""
-    brought = np.einsum("lij,lj->li", response, command)
-    return brought, _INTERPOLATED**2 * np.abs(brought) ** 2
+    contribution = np.einsum("lij,lj->li", response, command)
+    return contribution, _INTERPOLATED**2 * np.abs(contribution) ** 2

@@ -41,8 +41,8 @@ def force_states(
     for all regions tested."""
     found = []
     for k, channel in enumerate(recording.command.channels):
-        mine = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
-        if not mine:
+        of_channel = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
+        if not of_channel:
             continue
         letter = axis_letter(channel, recording.command.channels)
         length = system.length
@@ -55,9 +55,9 @@ def force_states(
             State("time", "t", "s", np.arange(len(command)) / evidence.sample_rate_hz),
         ]
         strata = _strata(recording, evidence.used > 0, command)
-        worst = max(mine, key=lambda cell: cell.in_noise)
+        worst = max(of_channel, key=lambda cell: cell.in_noise)
         seen = state_regions(Disturbance(evidence.axis_force[:, k], strata, command), states, _SEED)
-        found.append([StateMismatch(worst.output, channel, _band(mine), region) for region in seen])
+        found.append([StateMismatch(worst.output, channel, _band(of_channel), region) for region in seen])
     return _correct_p_values(found, FORCE_TESTS)
 
 
@@ -68,8 +68,8 @@ def error_states(
     found = []
     for k, channel in enumerate(recording.response.channels):
         own = recording.response.quantities[k]
-        mine = [cell for cell in cells if cell.beyond_noise and (cell.output, cell.quantity) == (channel, own)]
-        if not mine or channel not in channels:
+        of_channel = [cell for cell in cells if cell.beyond_noise and (cell.output, cell.quantity) == (channel, own)]
+        if not of_channel or channel not in channels:
             continue
         reading = evidence.response[:, k]
         states = [
@@ -78,10 +78,10 @@ def error_states(
         ]
         strata = _strata(recording, evidence.used > 0, reading)
         inputs = "+".join(
-            channel for channel in recording.command.channels if any(channel in m.input.split("+") for m in mine)
+            channel for channel in recording.command.channels if any(channel in m.input.split("+") for m in of_channel)
         )
         seen = state_regions(Disturbance(reading - evidence.predicted[:, k], strata, reading), states, _SEED)
-        found.append([StateMismatch(channel, inputs, _band(mine), region) for region in seen])
+        found.append([StateMismatch(channel, inputs, _band(of_channel), region) for region in seen])
     return _correct_p_values(found, ERROR_TESTS)
 
 
@@ -114,9 +114,9 @@ def _strata(recording: Recording, used: Mask, driven: FloatArray) -> IntArray:
     n = len(driven)
     strata = np.full(n, -1, dtype=np.int64)
     parts = [(s.start, min(s.stop, n)) for s in recording.segments if s.kind != "rest" and s.start < n] or [(0, n)]
-    loud = [float(np.sqrt(np.nanmean(driven[start:stop] ** 2))) for start, stop in parts]
-    for number, ((start, stop), rms) in enumerate(zip(parts, loud, strict=True)):
-        if rms > _DRIVEN * max(loud):
+    driven_rms = [float(np.sqrt(np.nanmean(driven[start:stop] ** 2))) for start, stop in parts]
+    for number, ((start, stop), rms) in enumerate(zip(parts, driven_rms, strict=True)):
+        if rms > _DRIVEN * max(driven_rms):
             strata[start:stop] = number
     strata[~used] = -1
     return strata

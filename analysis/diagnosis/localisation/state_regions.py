@@ -210,12 +210,11 @@ def _has_sign(state: State) -> bool:
     return state.kind in ("position", "velocity")
 
 
-# Regions of state in words.
 def region_in_words(
     kind: str, symbol: str, unit: str, bins: tuple[int, int, int], centre: float, one_stratum: bool
 ) -> str:
-    """Words for a region. bins: first and last of it, and the number of all. centre: mean state of the mismatch in
-    it."""
+    """Words for a region of the state, such as "near x = 12 mm". bins: first and last of it, and the number of all.
+    centre: mean state of the mismatch in it."""
     first, last, count = bins
     low, high = first == 0, last == count - 1
     if kind == "time":

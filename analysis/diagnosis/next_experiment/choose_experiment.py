@@ -46,7 +46,7 @@ class Bench:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedGain:
-    """What an experiment would tell between the named effect and a rival."""
+    """Expected discrimination between the named effect and a rival by an experiment."""
 
     experiment: Experiment
     gain: float
@@ -68,7 +68,7 @@ class ExperimentSet:
     """The experiments to make next and the rivals that they discriminate; empty where none would."""
 
     experiments: tuple[Experiment, ...]
-    told: tuple[int, ...]
+    discriminated: tuple[int, ...]
     """Which rivals they discriminate from what is named, by their place."""
     gain: float
     """Smallest expected log likelihood ratio, over these rivals."""
@@ -90,9 +90,9 @@ def choose_set(predicted: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
     while wanted:
         chosen = _single(alone[wanted], cost) or _cover(shared[wanted], cost)
         if chosen:
-            told = tuple(sorted(wanted))
+            discriminated = tuple(sorted(wanted))
             gain = alone[wanted][:, chosen].min() if len(chosen) == 1 else shared[wanted][:, chosen].sum(axis=1).min()
-            return ExperimentSet(tuple(menu[number] for number in chosen), told, float(gain))
+            return ExperimentSet(tuple(menu[number] for number in chosen), discriminated, float(gain))
         wanted.pop()
     return ExperimentSet((), (), 0.0)
 
@@ -130,7 +130,7 @@ def as_document(best: ExperimentSet, names: Sequence[str]) -> NextExperiment | N
     where = "in these recordings together" if more else "there"
     return NextExperiment(
         command="; then ".join([f"record {first}", *more]),
-        splits=(names[0], *dict.fromkeys(names[1 + number] for number in best.told)),
+        splits=(names[0], *dict.fromkeys(names[1 + number] for number in best.discriminated)),
         why=f"{where} they differ by more than the noise and the tolerances can hide: the right one would win by at "
         f"least {best.gain:.3g} in log likelihood{said}",
     )
@@ -199,7 +199,7 @@ def _simulate(
     model = add_mass(model, experiment.added) if experiment.added else model
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
         simulated = simulate_mechanism(
-            model, experiment.commands, bench.sample_rate_hz, hypothesis.placed_effects(point), bench.hold
+            model, experiment.commands, bench.sample_rate_hz, hypothesis.list_placed_effects(point), bench.hold
         )
         signals = np.hstack([simulated.response, simulated.position])[:, : len(bench.noise)]
         return np.asarray((signals / bench.noise).ravel())

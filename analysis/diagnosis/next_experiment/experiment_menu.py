@@ -49,7 +49,7 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
     length_s = CYCLES / slowest_hz
     fade = int(_FADE * length_s * sample_rate_hz)
     slow_hz = 4.0 / length_s
-    added = ADDED_SHARE * _grounded_mass(model)
+    added = ADDED_SHARE * _find_grounded_mass(model)
 
     def along(wave: FloatArray) -> FloatArray:
         return np.outer(apply_fades(wave, fade, fade), np.arange(model.inputs) == axis)
@@ -125,7 +125,7 @@ def _releases(level: float, samples: int) -> FloatArray:
     return np.concatenate([sign * ramp for sign in signs])
 
 
-def _grounded_mass(model: MechanicalModel) -> float:
+def _find_grounded_mass(model: MechanicalModel) -> float:
     axes = driven_axes(model)
     return float(np.diagonal(axes.T @ model.mass @ axes).mean())
 

@@ -62,7 +62,8 @@ def propose_experiment(context: SearchContext, found: Explanation) -> Proposal |
         bench = Bench(context.tuning, rate_hz, record.recording.hold, context.measure.noise)
         menu = experiment_menu(context.tuning.model, rate_hz, axis, level)
         predicted = [
-            predict_gains(bench, named, rival.fitted, _recorded_information(context, rival), menu) for rival in rivals
+            predict_gains(bench, named, rival.fitted, _compute_recorded_information(context, rival), menu)
+            for rival in rivals
         ]
         names = (claim.effect.name, *(rival.newest for rival in rivals))
         proposal = Proposal(names, axis, level, choose_set(predicted))
@@ -85,7 +86,7 @@ def _has_conditions(fitted: Fitted) -> bool:
     return any(claim.effect.with_conditions for claim in fitted.hypothesis.claims)
 
 
-def _recorded_information(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
+def _compute_recorded_information(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
     """Information matrix of a candidate's parameters from the existing recordings, calibration included."""
     fitted = candidate.fitted
     own = hypothesis_sensitivity(

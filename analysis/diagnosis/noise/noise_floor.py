@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
-from analysis.diagnosis.noise.periods import Periods, settled_periods
+from analysis.diagnosis.noise.periods import Periods, find_settled_periods
 from analysis.diagnosis.noise.quiet_noise import quiet_band_noise, rest_noise
 from analysis.diagnosis.noise.repeat_noise import repeat_noise, with_rounding
 from equalizer.signals.recording import Recording
@@ -49,7 +49,7 @@ class NoiseFloor:
 def noise_floor(recording: Recording) -> NoiseFloor:
     """Estimate the noise from repeated periods; else from rest; else from the lines above the driven band, assumed to
     be white; else `how` is "unknown" and every rms NaN."""
-    periods = tuple(period for period in settled_periods(recording) if period.count > 1)
+    periods = tuple(period for period in find_settled_periods(recording) if period.count > 1)
     if periods:
         return _estimate_from_repeats(recording, periods)
     rate = recording.sample_rate_hz
@@ -59,13 +59,13 @@ def noise_floor(recording: Recording) -> NoiseFloor:
     if all(rest is not None for rest in rests):
         remark = "Nothing repeats in this recording: its noise is what it shows at rest."
         return _build_floor("rest", lines_hz, [rest for rest in rests if rest is not None], signals, remark)
-    quiet = [quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
-    if all(hiss is not None for hiss in quiet):
+    undriven = [quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
+    if all(hiss is not None for hiss in undriven):
         remark = (
             "Nothing repeats in this recording and it never rests: its noise is what lies above the driven band, "
             "and was taken to be as strong below."
         )
-        return _build_floor("quiet band", lines_hz, [hiss for hiss in quiet if hiss is not None], signals, remark)
+        return _build_floor("quiet band", lines_hz, [hiss for hiss in undriven if hiss is not None], signals, remark)
     remark = "Nothing repeats in this recording, it never rests and all its band is driven: its noise is not known."
     unknown = [(np.full((len(lines_hz), signal.samples.shape[1]), np.nan), 0.0) for signal in signals]
     return _build_floor("unknown", lines_hz, unknown, signals, remark)
@@ -88,15 +88,15 @@ def _build_floor(
 def _estimate_from_repeats(recording: Recording, periods: Sequence[Periods]) -> NoiseFloor:
     lines_hz = max(periods, key=lambda period: period.length).frequency_hz(recording.sample_rate_hz)
     response = repeat_noise(recording, recording.response.samples, periods, lines_hz)
-    remarks = _varying_remarks(recording.response, response)
+    remarks = _describe_variation(recording.response, response)
     position = None
     if recording.position is not None:
         position = repeat_noise(recording, recording.position.samples, periods, lines_hz)
-        remarks += _varying_remarks(recording.position, position)
+        remarks += _describe_variation(recording.position, position)
     return NoiseFloor("repeats", lines_hz, response, position, tuple(remarks))
 
 
-def _varying_remarks(signal: Signal, noise: ChannelNoise) -> list[str]:
+def _describe_variation(signal: Signal, noise: ChannelNoise) -> list[str]:
     remarks = []
     for number, name in enumerate(signal.channels):
         left = sum(segment.varies[number] for segment in noise.segments)

@@ -43,7 +43,7 @@ class Periods:
         return lines
 
 
-def settled_periods(recording: Recording) -> tuple[Periods, ...]:
+def find_settled_periods(recording: Recording) -> tuple[Periods, ...]:
     """The usable periods of every periodic segment. The first period is left out, and further ones until the transient
     has decayed; so are periods with missing samples. Segments without a usable period are left out."""
     found = []

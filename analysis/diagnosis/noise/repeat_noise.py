@@ -41,10 +41,10 @@ def repeat_noise(
     pooled = np.einsum("sc,slc->lc", weights, density) / weights.sum(axis=0)
     freedom_pooled = weights.sum(axis=0)
     varies = np.asarray(moved & ~counted)
-    floor, loud = _no_more_than_rest(recording, samples, pooled, freedom_pooled, np.asarray(varies.any(axis=0)))
-    smooth = smooth_over_lines(floor, _SMOOTHED_LINES)
-    smooth *= floor.mean(axis=0) / np.maximum(smooth.mean(axis=0), _TINY)
-    whole, rounding = with_rounding(smooth, samples)
+    smooth = smooth_over_lines(pooled, _SMOOTHED_LINES)
+    smooth *= pooled.mean(axis=0) / np.maximum(smooth.mean(axis=0), _TINY)
+    floor, above_rest = _no_more_than_rest(recording, samples, smooth, freedom_pooled, np.asarray(varies.any(axis=0)))
+    whole, rounding = with_rounding(floor, samples)
     segments = tuple(
         SegmentNoise(
             period.index,
@@ -56,7 +56,9 @@ def repeat_noise(
         )
         for k, period in enumerate(periods)
     )
-    return ChannelNoise(np.sqrt(whole.mean(axis=0)), whole, freedom_pooled, rounding, segments, tuple(loud.tolist()))
+    return ChannelNoise(
+        np.sqrt(whole.mean(axis=0)), whole, freedom_pooled, rounding, segments, tuple(above_rest.tolist())
+    )
 
 
 def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -70,10 +72,11 @@ def with_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray,
 
 
 def quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
-    """Which rows do not differ significantly from the quietest of their column. Both (rows, channels)."""
+    """Mask (rows, channels) of the variances that do not differ significantly from the smallest of their column (F
+    test). variance, freedom: (rows, channels), variances and their degrees of freedom."""
     least = np.argmin(variance, axis=0)
     columns = np.arange(variance.shape[1])
-    bound = fdtri(freedom, freedom[least, columns], 1 - _ALIKE)
+    bound = _largest_ratio(freedom, freedom[least, columns])
     return np.asarray(variance <= bound * variance[least, columns], dtype=np.bool_)
 
 
@@ -104,14 +107,22 @@ def _moves_over_steps(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
 def _no_more_than_rest(
     recording: Recording, samples: FloatArray, density: FloatArray, freedom: FloatArray, varied: Mask
 ) -> tuple[FloatArray, Mask]:
-    """The density, capped by the noise at rest in channels whose segments varied and all exceed it."""
+    """The density of the noise at rest, in channels whose segments varied and all exceed it; but at lines where the
+    given density is significantly lower. density: smoothed over lines."""
     none = np.zeros(len(varied), dtype=np.bool_)
     hiss = fast_noise_at_rest(recording, samples)
     if hiss is None or not varied.any():
         return density, none
-    quiet = quietest(hiss.variance, hiss.freedom)
-    weights = np.where(quiet, hiss.freedom, 0.0)
+    at_rest = quietest(hiss.variance, hiss.freedom)
+    weights = np.where(at_rest, hiss.freedom, 0.0)
     rest = np.sum(weights * hiss.variance, axis=0) / weights.sum(axis=0)
-    bound = fdtri(freedom, weights.sum(axis=0), 1 - _ALIKE)
-    loud = varied & (density.mean(axis=0) > bound * rest) & (rest > 0)
-    return np.where(loud, np.minimum(density, rest), density), np.asarray(loud, dtype=np.bool_)
+    above_rest = varied & (density.mean(axis=0) > _largest_ratio(freedom, weights.sum(axis=0)) * rest) & (rest > 0)
+    # The smaller of both at each line would be too small on average: of two estimates of one noise, the lower.
+    of_line = np.maximum(freedom * _SMOOTHED_LINES / len(density), 1.0)
+    lower = rest > _largest_ratio(weights.sum(axis=0), of_line) * density
+    return np.where(above_rest & ~lower, rest, density), np.asarray(above_rest, dtype=np.bool_)
+
+
+def _largest_ratio(freedom: FloatArray, others: FloatArray) -> FloatArray:
+    """Ratio of two variances of equal noise, exceeded with probability `_ALIKE`, by their degrees of freedom."""
+    return np.asarray(fdtri(freedom, others, 1 - _ALIKE))

@@ -49,7 +49,7 @@ def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:
     seen = between_repeats / step**2
     if seen > 1.0:
         return RoundedNoise(between_repeats, 0.0)
-    repeating = _repeating_variance(_variance_before_rounding(seen)) * step**2
+    repeating = _compute_repeating_variance(_variance_before_rounding(seen)) * step**2
     return RoundedNoise(between_repeats + repeating, repeating)
 
 
@@ -59,11 +59,11 @@ def _variance_before_rounding(seen: float) -> float:
     low, high = 0.0, 1.0 if seen > 0 else 0.0
     for _ in range(_HALVES):
         middle = (low + high) / 2
-        low, high = (middle, high) if middle + 1 / 12 - _repeating_variance(middle) < seen else (low, middle)
+        low, high = (middle, high) if middle + 1 / 12 - _compute_repeating_variance(middle) < seen else (low, middle)
     return high
 
 
-def _repeating_variance(variance: float) -> float:
+def _compute_repeating_variance(variance: float) -> float:
     """Variance of the repeating part for steps of 1. variance: of the noise before rounding."""
     blurred = np.exp(-4 * np.pi**2 * _TERMS**2 * variance) / _TERMS**2
     left_out = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _TERMS**2))

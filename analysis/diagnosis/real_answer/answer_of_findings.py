@@ -7,7 +7,7 @@ import numpy as np
 from analysis.diagnosis.effect_words import parameters_text
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation_words import localisation_sentences
-from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, HeldOutStretch, OwnNumber, RealAnswer
+from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, HeldOutStretch, OwnParameter, RealAnswer
 from analysis.diagnosis.result.candidate_wording import candidate_sentences
 from analysis.diagnosis.result.findings import Findings, TimeSeries
 from analysis.diagnosis.result.wording import (
@@ -49,11 +49,11 @@ def answer_of_findings(
         held_out=diagnosis.fit.test,
         black_box=None if box is None or not np.isfinite(box.test) else box.test,
         where=localisation_sentences(found.local) if found.maps else (),
-        named=named_sentences(found),
+        named=describe_named(found),
         effects=tuple(effect.effect for effect in diagnosis.effects),
         left=remainder_sentence(diagnosis, device_of(found)),
         remarks=found.remarks,
-        numbers=own_numbers(found, nominal),
+        numbers=own_parameters(found, nominal),
         stretches=held_out_stretches(found.time_series),
         excerpt=drawn_excerpt(found.time_series),
         further=(),
@@ -65,7 +65,7 @@ def answer_of_findings(
     )
 
 
-def named_sentences(found: Findings) -> tuple[str, ...]:
+def describe_named(found: Findings) -> tuple[str, ...]:
     """Each effect with its parameters, and what these data cannot tell from it."""
     single = found.given.inputs == 1
     return tuple(
@@ -144,33 +144,36 @@ def _change(series: TimeSeries, start: int, stop: int) -> FloatArray:
     return np.asarray(np.nan_to_num(np.abs(series.retuned - series.after)[start:stop] / size))
 
 
-# The simple model's own parameters after a diagnosis, with their intervals, where it is one body.
-def own_numbers(found: Findings, nominal: Mapping[str, float]) -> tuple[OwnNumber, ...]:
-    """Mass, damping and stiffness of one body; none where there are more. nominal: by these words, SI.
+def own_parameters(found: Findings, nominal: Mapping[str, float]) -> tuple[OwnParameter, ...]:
+    """Mass, damping and stiffness of the re-tuned model with their 95 % intervals, where it has one body; else empty.
+    nominal: values known by other means, by these words, in SI.
 
-    The intervals are at the end of the search, on the samples that were fitted to. Where what is left is no noise, they
-    are widened by how many times the noise it is: a law that is a little wrong shifts what stands beside it.
+    The intervals are those at the end of the search, on the samples that were fitted. Where the residual exceeds the
+    noise they are widened by the ratio of both in the worst channel: a slightly wrong law shifts the other parameters.
     """
     model, tuning = found.given, found.tuning
     if model.coordinates != 1 or found.explanation.statistic is not None or tuning is None or found.own_errors is None:
         return ()
     after = found.explanation.after
     wide = max(after.score.worst_channel, 1.0)
-    return _numbers(tuning, model, tuning.values(after.fitted.deviations), found.own_errors * wide, nominal)
+    return _parameters(tuning, model, tuning.values(after.fitted.deviations), found.own_errors * wide, nominal)
 
 
-def _numbers(
+def _parameters(
     tuning: Tuning, model: MechanicalModel, changes: FloatArray, errors: FloatArray, nominal: Mapping[str, float]
-) -> tuple[OwnNumber, ...]:
+) -> tuple[OwnParameter, ...]:
     given = (model.mass[0, 0], model.damping[0, 0], model.stiffness[0, 0])
     words = ("mass", "damping", "stiffness")
     rows = zip(words, given, tuning.units, changes, errors, strict=False)
-    return tuple(_number(name, unit, float(start + by), float(error), nominal) for name, start, unit, by, error in rows)
+    return tuple(
+        _compare_parameter(name, unit, float(start + by), float(error), nominal)
+        for name, start, unit, by, error in rows
+    )
 
 
-def _number(name: str, unit: str, value: float, error: float, nominal: Mapping[str, float]) -> OwnNumber:
+def _compare_parameter(name: str, unit: str, value: float, error: float, nominal: Mapping[str, float]) -> OwnParameter:
     reach = _REACH * error
     sure = bool(np.isfinite(reach))
-    return OwnNumber(
+    return OwnParameter(
         name, unit, value, value - reach if sure else None, value + reach if sure else None, nominal.get(name)
     )

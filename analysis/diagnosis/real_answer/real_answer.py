@@ -35,7 +35,7 @@ class HeldOutStretch:
 
 
 @dataclass(frozen=True, config=STRICT)
-class OwnNumber:
+class OwnParameter:
     """A number of the simple model after everything, with its 95 % interval, and what is known by other means."""
 
     name: str
@@ -131,7 +131,7 @@ class RealAnswer:
     left: str
     """What is still unexplained, in a sentence."""
     remarks: tuple[str, ...]
-    numbers: tuple[OwnNumber, ...]
+    numbers: tuple[OwnParameter, ...]
     stretches: tuple[HeldOutStretch, ...]
     excerpt: DrawnExcerpt | None
     further: tuple[FurtherTest, ...]

@@ -106,7 +106,7 @@ def contrast_of(
 
 def predicts_clean(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
     """Whether the model as it is predicts every clean recording with an error of at most `LARGEST_CLEAN_ERROR`."""
-    errors = [prediction_error(recording, model, "all").as_it_is for recording in clean]
+    errors = [prediction_error(recording, model, "all").without_gain for recording in clean]
     return all(error is not None and error <= LARGEST_CLEAN_ERROR for error in errors)
 
 

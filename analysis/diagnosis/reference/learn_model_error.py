@@ -1,4 +1,10 @@
-"""Learns a model's error from clean recordings: the residual of the re-tuned model, which then counts as noise."""
+"""Model error learned from clean recordings: the residual of the re-tuned model, which then counts as noise.
+
+A linear model is never exact. What it leaves on recordings of the intact device is no evidence for a missing effect. It
+is learned in two forms: its share of the signal by channel, input and octave (the floor of the mismatch map), and its
+spectrum, as the filter that whitens it (an AR(p) model, `whitening_filter`). In the diagnosed recordings residuals pass
+through this filter, and their noise is the whitened residual's rms, scaled with the signal.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,18 +32,20 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 LEARNING = "learning from the clean recordings"
-BEGUN = 0.02
+LEARNED_AT = 0.02
 """Progress (share of the whole diagnosis) at the end of learning."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Lesson:
+class _RetunedFit:
+    """The model re-tuned to a clean recording: error measure, fit, and the residual's share of the signal."""
+
     measure: ErrorMeasure
     tuning: Tuning
     retuned: FittedCandidate
     cells: tuple[MismatchCell, ...]
     channels: FloatArray
-    """(c,): share of the signal."""
+    """(c,): rms of the residual above the noise over the rms of the signal."""
 
     @property
     def residuals(self) -> tuple[FloatArray, ...]:
@@ -74,16 +82,16 @@ def learn_model_error(
     device, alike in channels and units; the model is re-tuned to each separately, because recordings of different days
     differ. diagnosed: the recordings to diagnose, with the same measure. Raises NothingLearned where that cannot be."""
     error = measure_of(diagnosed, model, clean).measure.name
-    lessons: list[_Lesson] = []
+    fits: list[_RetunedFit] = []
     for number, recording in enumerate(clean):
-        progress(LEARNING, BEGUN * number / len(clean))
+        progress(LEARNING, LEARNED_AT * number / len(clean))
         chosen = measure_of((recording,), model, (*diagnosed, *clean))
         require_alike(chosen.measure.name, error)
-        lessons.append(_learn_from_recording(chosen, model, recording, map_))
-    floor = learn_floor([lesson.cells for lesson in lessons])
-    largest = np.max([lesson.channels for lesson in lessons], axis=0)
+        fits.append(_learn_from_recording(chosen, model, recording, map_))
+    floor = learn_floor([fit.cells for fit in fits])
+    largest = np.max([fit.channels for fit in fits], axis=0)
     floor = replace(floor, error=error, recordings=len(clean), channels=tuple(largest.tolist()))
-    return _whiten_floor(floor, lessons, map_)
+    return _learn_spectrum(floor, fits, map_)
 
 
 def learn_model_floor(
@@ -105,23 +113,25 @@ def require_alike(learned_by: str, error: str) -> None:
         )
 
 
-def _whiten_floor(floor: CleanFloor, lessons: Sequence[_Lesson], map_: Mapper) -> LearnedError:
-    residuals = [each for lesson in lessons for each in lesson.residuals]
-    whitening = whitening_filter(residuals, np.min([lesson.measure.noise for lesson in lessons], axis=0))
+def _learn_spectrum(floor: CleanFloor, fits: Sequence[_RetunedFit], map_: Mapper) -> LearnedError:
+    """The whitening filter of all residuals, the whitened residual's share of the signal (the largest of all
+    recordings), and the clean recordings as references."""
+    residuals = [each for fit in fits for each in fit.residuals]
+    whitening = whitening_filter(residuals, np.min([fit.measure.noise for fit in fits], axis=0))
     shares = [
-        _rms([whitening.apply(residual) for residual in lesson.residuals])
-        / _signal(lesson.measure, lesson.retuned.fitted.residuals)
-        for lesson in lessons
+        _rms([whitening.apply(residual) for residual in fit.residuals])
+        / _signal(fit.measure, fit.retuned.fitted.residuals)
+        for fit in fits
     ]
     share = np.max(shares, axis=0)
     learned = [
         reference_recording(
-            whiten_measure(count_as_noise(lesson.measure, floor), whitening, share * lesson.signal),
-            lesson.tuning,
-            lesson.retuned.fitted.deviations,
+            whiten_measure(count_as_noise(fit.measure, floor), whitening, share * fit.signal),
+            fit.tuning,
+            fit.retuned.fitted.deviations,
             map_,
         )
-        for lesson in lessons
+        for fit in fits
     ]
     return LearnedError(floor, whitening, share, ReferenceRecordings(tuple(learned), floor.beyond))
 
@@ -139,19 +149,22 @@ def _rms(residuals: Sequence[FloatArray]) -> FloatArray:
     return np.asarray(np.sqrt(np.nanmean(np.vstack(residuals) ** 2, axis=0)))
 
 
-def _learn_from_recording(chosen: MeasureChoice, model: MechanicalModel, recording: Recording, map_: Mapper) -> _Lesson:
+def _learn_from_recording(
+    chosen: MeasureChoice, model: MechanicalModel, recording: Recording, map_: Mapper
+) -> _RetunedFit:
     whole, tuning = chosen.measure, tuning_of(model, recording.command.channels)
     context = SearchContext(whole.shorten(), whole, tuning, map_)
     retuned = context.with_test_score(context.candidate(retune_alone(context)))
     cells = cells_of(whole, retuned.fitted, chosen.floors)
-    return _Lesson(whole, tuning, retuned, cells, _channel_shares(whole, retuned))
+    return _RetunedFit(whole, tuning, retuned, cells, _channel_shares(whole, retuned))
 
 
 def _channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> FloatArray:
-    """(c,): the largest over the samples to fit, to choose and to test by."""
+    """(c,): rms of the residual above the noise over the rms of the signal, the largest over the samples to fit, to
+    choose and to test by: sqrt(score² - 1) noise / signal, where the score is rms residual over rms noise."""
     score = retuned.score
-    times = np.nanmax(np.maximum([score.fit, score.choose, score.test], 1.0), axis=0)
-    return np.asarray(np.sqrt(times**2 - 1) * measure.noise / np.maximum(_size(measure), np.finfo(float).tiny))
+    worst = np.nanmax(np.maximum([score.fit, score.choose, score.test], 1.0), axis=0)
+    return np.asarray(np.sqrt(worst**2 - 1) * measure.noise / np.maximum(_size(measure), np.finfo(float).tiny))
 
 
 def count_as_noise(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:

@@ -11,9 +11,9 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.no_prediction import is_without_prediction
 from analysis.diagnosis.search.revise_selection import without_effect
-from analysis.diagnosis.search.search import SearchResult, Unconfirmed, search_effects
+from analysis.diagnosis.search.search import search_effects
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import Judgement, SearchResult, Unconfirmed
 from analysis.diagnosis.settings import EXPLAINED_ERROR, NOISE_ALONE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect

@@ -26,9 +26,8 @@ from analysis.diagnosis.result.unconfirmed import with_gains
 from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import final_errors, interval_errors
-from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
 from equalizer.effects.placing import axis_letter, model_effects
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -46,7 +45,7 @@ def assemble_findings(
     nothing is named. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
     context, found, judged = result.context, result.found, result.judgement
     measure, tuning = context.whole, context.tuning
-    recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.placed_effects()
+    recording, placed = measure.records[0].recording, found.after.fitted.hypothesis.list_placed_effects()
     labels, (improved, retuned) = labels_of(recording, tuning.model), _models(result, recording)
     channels, errors = channel_names(recording, len(measure.noise)), _standard_errors(result)
     maps = mismatch_maps(measure, found.stages, floors, learned, context.map_)
@@ -87,7 +86,10 @@ def _models(result: SearchResult, recording: Recording) -> tuple[MechanicalModel
     """The re-tuned models with the named effects and without, driven by the commands as they were recorded."""
     tuning, found = result.context.tuning, result.found
     fitted, labels = found.after.fitted, labels_of(recording, tuning.model)
-    effects = (*tuning.model.effects, *model_effects(fitted.hypothesis.placed_effects(), labels.inputs, labels.outputs))
+    effects = (
+        *tuning.model.effects,
+        *model_effects(fitted.hypothesis.list_placed_effects(), labels.inputs, labels.outputs),
+    )
     with_them = replace(tuning.tune(fitted.deviations), effects=effects)
     return as_recorded(with_them, recording), as_recorded(tuning.tune(found.retuned.fitted.deviations), recording)
 
@@ -225,10 +227,10 @@ def _units(recording: Recording) -> tuple[str, ...]:
     )
 
 
-# Rows of the residual where impacts are compared by band power: no simulation predicts single impacts.
 def impact_remainder(measure: ErrorMeasure, found: Explanation) -> tuple[Mismatch, ...]:
     """One row for each channel whose band powers differ by more than chance; the share is the rms logarithm of the
-    ratio of amplitudes. Empty where samples were compared."""
+    ratio of amplitudes. For impacts, which are compared by band power because no simulation predicts single ones; empty
+    where samples were compared."""
     if found.statistic is None:
         return ()
     record, score = measure.records[0].recording, found.after.score

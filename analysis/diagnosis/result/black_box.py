@@ -24,9 +24,9 @@ _LEAST_RMS = 1e-6
 _TINY = np.finfo(np.float64).tiny
 
 
-def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, physics: float | None) -> BlackBox | None:
-    """The black box with `numbers` terms per channel and its error on the test samples. physics: the named effects'
-    error there, as in `document.Errors`. None where nothing is held out."""
+def black_box(measure: ErrorMeasure, retuned: FittedCandidate, terms: int, physics: float | None) -> BlackBox | None:
+    """The black box with that number of terms per channel and its error on the test samples. physics: the named
+    effects' error there, as in `document.Errors`. None where nothing is held out."""
     if physics is None or not any(record.test.any() for record in measure.records):
         return None
     fitted = [record.fit for record in measure.records]
@@ -41,7 +41,7 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, phy
     every = max(len(rows) // SELECTION_SAMPLES, 1)
     seen = _terms(rows[::every], range(_term_count(rows)))
     scale = _scale(seen)
-    chosen = [_select_terms(seen / scale, wanted, numbers) for wanted in left[::every].T]
+    chosen = [_select_terms(seen / scale, wanted, terms) for wanted in left[::every].T]
     picked = sorted({number for each in chosen for number in each})
     whole, weights = _terms(rows, picked) / scale[picked], np.zeros((len(picked), left.shape[1]))
     for channel, each in enumerate(chosen):
@@ -53,8 +53,8 @@ def black_box(measure: ErrorMeasure, retuned: FittedCandidate, numbers: int, phy
     ]
     return BlackBox(
         "polynomial of the model's signals",
-        numbers * left.shape[1],
-        _normalised_error(measure, np.vstack(corrected)),
+        terms * left.shape[1],
+        _normalise_error(measure, np.vstack(corrected)),
         physics,
     )
 
@@ -88,7 +88,8 @@ def _term_count(base: FloatArray) -> int:
 
 
 def _terms(base: FloatArray, numbers: Sequence[int]) -> FloatArray:
-    """(n, parameters): some of the terms. base: (n, 2 signals)."""
+    """(n, terms): the terms of these numbers. base: (n, 2 signals). With s a signal, number = power (2 signals) +
+    index: s, s², s |s| and s³ for powers 0 to 3; then the products of two signals."""
     width = base.shape[1]
     products = list(combinations(range(width // 2), 2))
     found = np.empty((len(base), len(numbers)))
@@ -116,7 +117,7 @@ def _select_terms(seen: FloatArray, wanted: FloatArray, count: int) -> list[int]
     return picked
 
 
-def _normalised_error(measure: ErrorMeasure, left: FloatArray) -> float:
+def _normalise_error(measure: ErrorMeasure, left: FloatArray) -> float:
     """Rms error over the rms signal, root mean square over channels. left: (test samples, c), in units of the
     measure."""
     size = np.maximum(signal_rms(measure.records, [record.test for record in measure.records]), _TINY)

@@ -76,7 +76,7 @@ def class_noun(effect: NamedEffect) -> str:
 
 
 def class_sentence(effect: NamedEffect) -> str:
-    """Which laws would explain the data as well; empty where the data tell it from all others."""
+    """Which laws would explain the data as well; empty where the data distinguish it from all others."""
     inseparable = [rival.effect for rival in effect.rivals if rival.inseparable]
     names = tuple(dict.fromkeys((*_class_names(effect), *inseparable)))
     if len(names) < 2:
@@ -137,7 +137,7 @@ def candidate_sentences(diagnosis: Diagnosis, device: Device | None = None) -> t
 
 
 def best_candidate_sentence(diagnosis: Diagnosis, device: Device | None = None) -> str:
-    """Empty where something is named, nothing is missing, or nothing helps."""
+    """Sentence on the best candidate of an unexplained mismatch; empty for other verdicts, and without a candidate."""
     if diagnosis.verdict != "unexplained" or not diagnosis.candidates:
         return ""
     return f"Best candidate, not confirmed: {_with_gain(diagnosis.candidates[0], device)}"

@@ -31,7 +31,7 @@ REFINING = {
     "drifting_force": ("constant_force",),
 }
 """Laws that are not simulated, and the special cases that each contains."""
-# Why a candidate is not named, as the document says it: PLAINER, ALIKE and BEYOND.
+# PLAINER, ALIKE and BEYOND: reasons for which a candidate is not named, as the document states them.
 PLAINER = "its special case, which is named, leaves hardly more in a simulation, where its further parameters are open"
 ALIKE = "as good in its place on held-out data"
 LATE = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offset")
@@ -94,17 +94,17 @@ def with_balances(
     if not balances:
         return diagnosis
     weighed = [
-        (law, axis_letter(channels[axis], channels), _explained_share(balance, law))
+        (law, axis_letter(channels[axis], channels), _compute_explained_share(balance, law))
         for axis, balance in enumerate(balances)
         for law in balance.laws
     ]
     constants = {
         f"{effect.effect.replace('_', ' ')} {effect.axis}": effect.parameters[CONSTANTS[effect.effect]].value
         for effect in diagnosis.effects
-        if effect.effect in CONSTANTS and _weighed_law(effect, weighed) is None
+        if effect.effect in CONSTANTS and _weigh_law(effect, weighed) is None
     }
     effects = tuple(
-        _with_class(effect, _weighed_law(effect, weighed))
+        _with_class(effect, _weigh_law(effect, weighed))
         for effect in diagnosis.effects
         if f"{effect.effect.replace('_', ' ')} {effect.axis}" not in constants
     )
@@ -124,7 +124,7 @@ def with_balances(
     return replace(diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_once(left)[:MOST])
 
 
-def _weighed_law(
+def _weigh_law(
     effect: NamedEffect, weighed: "Sequence[tuple[JudgedLaw, str, float]]"
 ) -> "tuple[JudgedLaw, float] | None":
     """The law of a balance that an effect was named after, and its share of the mismatch. weighed: with axis and
@@ -209,7 +209,7 @@ def _once(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     return tuple(first.values())
 
 
-def _explained_share(balance: "Balance", law: "JudgedLaw") -> float:
+def _compute_explained_share(balance: "Balance", law: "JudgedLaw") -> float:
     """Share of the linear model's held-out error power that goes with a law; its own is of what all laws take."""
     whole = 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2 if law.has_column else 1.0
     return min(max(whole * law.share, 0.0), 1.0)

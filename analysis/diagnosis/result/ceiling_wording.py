@@ -32,12 +32,12 @@ def black_box_beats(box: BlackBox) -> bool:
     return box.test * SAME_TO_READERS < box.physics
 
 
-def ceiling_sentences(reached: Sequence[BalanceErrors]) -> tuple[str, ...]:
+def describe_ceiling(reached: Sequence[BalanceErrors]) -> tuple[str, ...]:
     """One sentence per axis whose force balance was tested."""
-    return tuple(_ceiling_sentence(each, len(reached) == 1) for each in reached)
+    return tuple(_describe_ceiling_of_axis(each, len(reached) == 1) for each in reached)
 
 
-def _ceiling_sentence(reached: BalanceErrors, single: bool) -> str:
+def _describe_ceiling_of_axis(reached: BalanceErrors, single: bool) -> str:
     along = "" if single else f" along {reached.axis}"
     if not reached.tested:
         return (
@@ -56,7 +56,7 @@ def _ceiling_sentence(reached: BalanceErrors, single: bool) -> str:
     )
 
 
-_NOISE_SOURCES = {"rest": "as it is heard at rest", "quiet band": "as it is above the driven band"}
+_NOISE_SOURCES = {"rest": "as it is at rest", "quiet band": "as it is above the driven band"}
 """Ways of estimating noise other than from repeats: its level during excitation is then unknown, so errors are not
 stated in units of it."""
 

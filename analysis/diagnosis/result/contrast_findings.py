@@ -47,7 +47,7 @@ def add_contrast(whole: Findings, found: Contrast, recording: Recording, beyond:
     else:
         diagnosis = _with_comparison(whole.diagnosis, found.comparison, found.decision, recording, whole.given.system)
         remarks = (BESIDE.format(beyond), *(() if found.comparison.complete else (OUT_OF_TIME,)))
-    improved = _improved_model(whole.given, diagnosis.effects)
+    improved = _improve_model(whole.given, diagnosis.effects)
     return replace(
         whole, diagnosis=diagnosis, improved=improved, remarks=(*remarks, *whole.remarks), proposal=None, black_box=None
     )
@@ -72,7 +72,7 @@ def _with_comparison(
     diagnosis: Diagnosis, found: Comparison, decided: Decision, recording: Recording, system: UnitSystem
 ) -> Diagnosis:
     best = decided.named
-    named = () if best is None else (_named_fault(best, decided, recording, system),)
+    named = () if best is None else (_name_fault(best, decided, recording, system),)
     candidates = tuple(_candidate(law, why, recording) for law, why in decided.others)
     verdict: Verdict = "partly_explained" if named else "no_mismatch" if found.excess <= SETS_AS_ONE else "unexplained"
     fit = Fit(
@@ -94,7 +94,7 @@ def _errors(found: Comparison, before: float, after: float) -> Errors:
     return Errors(sizes[0], sizes[0], sizes[1], None)
 
 
-def _named_fault(best: JudgedFault, decided: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
+def _name_fault(best: JudgedFault, decided: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
     effect = best.fault.effect
     rivals = tuple(Rival(name, 0.0, True, "as good in its place on what was compared") for name in decided.alike)
     return NamedEffect(
@@ -153,7 +153,7 @@ def _directly_shown_fault(found: Contrast, recording: Recording) -> NamedEffect 
         name, sites, values, place = found.line.effect, found.line.channels, found.line.values, found.line.place
     elif found.shown is not None:
         claim = found.shown.claims[0]
-        name, sites, values = claim.effect.name, claim.sites, dict(found.shown.placed_effects()[0].values)
+        name, sites, values = claim.effect.name, claim.sites, dict(found.shown.list_placed_effects()[0].values)
     else:
         return None
     signal = recording.response if place == "sensor" else recording.command
@@ -169,7 +169,7 @@ def _directly_shown_fault(found: Contrast, recording: Recording) -> NamedEffect 
     return NamedEffect(name, place, axis, 1.0, 1.0, known)
 
 
-def _improved_model(given: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:
+def _improve_model(given: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:
     """The given model with the faults that have a simulation."""
     played = tuple(
         ModelEffect(effect.effect, effect.axis, {name: estimate.value for name, estimate in effect.parameters.items()})

@@ -148,14 +148,14 @@ def _why_not(best: FittedCandidate, other: FittedCandidate, same: bool, words: t
 
 def _estimates(whole: Hypothesis, number: int, errors: FloatArray, own: slice, labels: Labels) -> dict[str, Estimate]:
     claim = whole.claims[number]
-    at = reported_parameters(whole, number, whole.point)
+    at = report_parameters(whole, number, whole.point)
     spread = {name: 0.0 for name in at}
     for coordinate in range(own.start, own.stop):
         if not np.isfinite(errors[coordinate]):
             continue
         moved = whole.point.copy()
         moved[coordinate] += errors[coordinate]
-        for name, value in reported_parameters(whole, number, moved).items():
+        for name, value in report_parameters(whole, number, moved).items():
             spread[name] += (value - at[name]) ** 2
     units = _units(claim.effect, at, labels)
     return {
@@ -188,7 +188,7 @@ def _interval(value: float, standard_error: float) -> tuple[float, float] | None
     return (value - reach, value + reach) if np.isfinite(reach) and reach > 0 else None
 
 
-def reported_parameters(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
+def report_parameters(whole: Hypothesis, number: int, point: FloatArray) -> dict[str, float]:
     """Parameters as the vocabulary defines them: of the first site, or of the largest for effects in `LARGEST`."""
     groups = _groups(whole, number, point)
     claim = whole.claims[number]
@@ -204,15 +204,15 @@ LARGEST = ("mains_hum", "sensor_drift", "sensor_offset")
 
 
 def _groups(whole: Hypothesis, number: int, point: FloatArray) -> Sequence[dict[str, float]]:
-    placed = whole.placed_effects(point)
+    placed = whole.list_placed_effects(point)
     first = sum(claim.groups for claim in whole.claims[:number])
     return [dict(effect.values) for effect in placed[first : first + whole.claims[number].groups]]
 
 
-# Probability of each candidate, from the differences of their log errors.
 def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> tuple[float, ...]:
-    """One probability each, with a sum below 1; the first candidate is the preferred one, and its refinements count for
-    it. left: errors of the whole explanation in the worst channel, in units of the noise."""
+    """Probability of each candidate, proportional to exp(-excess mean log error / PROBABILITY_SCALE), with a sum below
+    1; the first candidate is the preferred one, and its refinements count for it. left: errors of the whole explanation
+    in the worst channel, in units of the noise."""
     if not fitted_candidates:
         return ()
     best = fitted_candidates[0]
@@ -225,6 +225,7 @@ def probabilities(fitted_candidates: Sequence[FittedCandidate], left: float) -> 
 
 
 def probability_of_none(left: float) -> float:
-    """The probability that no candidate is right, although none in the catalogue is better."""
+    """Probability that no candidate is right: a logistic function of the logarithm of left - 1, from ELSEWHERE_LEAST to
+    ELSEWHERE_MOST. left: error of the explanation in the worst channel, in units of the noise."""
     odds = (max(left - 1.0, 0.0) / ELSEWHERE_HALFWAY) ** ELSEWHERE_STEEPNESS
     return float(ELSEWHERE_LEAST + (ELSEWHERE_MOST - ELSEWHERE_LEAST) * odds / (1 + odds))

@@ -19,8 +19,8 @@ from analysis.diagnosis.result.findings import BlackBox, Signature
 from analysis.diagnosis.result.named_effects import labels_of
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Part
-from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.verdict import SearchResult
 from equalizer.effects.effect import Values
 from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from analysis.diagnosis.document import Errors
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import RETUNING_BOUND, RETUNING_DOUBTED, RETUNING_NAMED, SAME_TO_READERS
+from analysis.diagnosis.settings import RETUNING_DOUBTED, RETUNING_NAMED, SAME_TO_READERS
 from analysis.diagnosis.unit_wording import error_text, value_text
 from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
@@ -25,6 +25,8 @@ class MovedParameter:
     """SI; "1" for a relative change."""
     deviations: float
     """The same in standard deviations of the calibration."""
+    at_bound: bool = False
+    """It moved as far as the search lets it."""
 
     @property
     def text(self) -> str:
@@ -42,20 +44,20 @@ class MovedParameter:
 def all_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
     """deviations: (parameters,)"""
     return tuple(
-        MovedParameter(name, float(change), unit, float(deviation))
+        MovedParameter(name, float(change), unit, float(deviation), bool(abs(deviation) >= tuning.bound - 1e-6))
         for name, change, unit, deviation in zip(
             tuning.names, tuning.values(deviations), tuning.units, deviations, strict=True
         )
     )
 
 
-def moved_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
+def find_moved_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParameter, ...]:
     """Parameters that moved by a standard deviation or more, the largest first. deviations: (parameters,)"""
     moved = [number for number in all_parameters(tuning, deviations) if abs(number.deviations) >= RETUNING_NAMED]
     return tuple(sorted(moved, key=lambda number: -abs(number.deviations)))
 
 
-def retuned_sentence(moved: Sequence[MovedParameter], fitted: bool = False) -> str:
+def describe_retuning(moved: Sequence[MovedParameter], fitted: bool = False) -> str:
     """Sentence on the parameters that were re-tuned beside named physics. fitted: the model was fitted to the same
     recordings first, so that no calibration holds its parameters."""
     if not moved:
@@ -71,9 +73,9 @@ def retuned_sentence(moved: Sequence[MovedParameter], fitted: bool = False) -> s
 
 def doubtful_sentences(moved: Sequence[MovedParameter], fitted: bool = False) -> tuple[str, ...]:
     """Sentence on parameters that left the likely range of their calibration: they may compensate for physics that was
-    not named. Many are only counted, because the table of parameters lists all. fitted: as in `retuned_sentence`."""
+    not named. Many are only counted, because the table of parameters lists all. fitted: as in `describe_retuning`."""
     far = [number for number in moved if abs(number.deviations) >= RETUNING_DOUBTED]
-    at_end = [number for number in far if abs(number.deviations) >= RETUNING_BOUND - 1e-6]
+    at_end = [number for number in far if number.at_bound]
     if fitted:
         names = conjoin([number.name for number in at_end])
         return (f"As far as they may, these parameters of the first model moved: {names}.{_OPEN}",) if at_end else ()
@@ -95,25 +97,25 @@ _OPEN = " The fit has found no best value for them, or they stand for physics th
 _AS_FAR = ", as far as it may"
 
 
-def _retuning_raises_error(errors: Errors) -> bool:
+def _is_error_raised(errors: Errors) -> bool:
     """Re-tuning raises the error on held-out data."""
     return errors.before is not None and errors.retuned is not None and errors.retuned > SAME_TO_READERS * errors.before
 
 
 def better_model(errors: Errors) -> tuple[str, str]:
     """Field and words of the better of the given and the re-tuned model, with which named effects are compared."""
-    return ("before", "as given") if _retuning_raises_error(errors) else ("retuned", "re-tuned without it")
+    return ("before", "as given") if _is_error_raised(errors) else ("retuned", "re-tuned without it")
 
 
 def better_alone(errors: Errors) -> tuple[str, float | None]:
     """Words for the better of the given and the re-tuned model, and its error: the given model only where re-tuning
     raises the error."""
-    return ("as given", errors.before) if _retuning_raises_error(errors) else ("re-tuned", errors.retuned)
+    return ("as given", errors.before) if _is_error_raised(errors) else ("re-tuned", errors.retuned)
 
 
-def raised_sentence(errors: Errors) -> str:
+def describe_raised_error(errors: Errors) -> str:
     """errors: on held-out data. Empty where re-tuning does not raise them."""
-    if not _retuning_raises_error(errors) or errors.before is None or errors.retuned is None:
+    if not _is_error_raised(errors) or errors.before is None or errors.retuned is None:
         return ""
     return (
         f"Re-tuning raises the error on held-out data from {error_text(errors.before)} to {error_text(errors.retuned)} "

@@ -7,15 +7,15 @@ from analysis.diagnosis.confirm.held_out_gain import held_out_gain
 from analysis.diagnosis.document import Candidate, Estimate, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.result.findings import BlackBox
-from analysis.diagnosis.result.named_effects import axis_of, labels_of, law_of_claim, reported_parameters
-from analysis.diagnosis.search.search import Unconfirmed
+from analysis.diagnosis.result.named_effects import axis_of, labels_of, law_of_claim, report_parameters
 from analysis.diagnosis.search.search_context import FittedCandidate
+from analysis.diagnosis.search.verdict import Unconfirmed
 from equalizer.effects.placing import place_of_effect
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 
-def unconfirmed_candidates(
+def list_unconfirmed_candidates(
     found: Sequence[Unconfirmed], box: BlackBox | None, recording: Recording, model: MechanicalModel
 ) -> tuple[Candidate, ...]:
     """The unconfirmed effects as candidates; of several in one hypothesis the last, unless one is specified. Shares are
@@ -32,7 +32,7 @@ def unconfirmed_candidates(
                 effect=claim.effect.name,
                 place=place_of_effect(claim.effect),
                 axis=axis_of(claim, labels),
-                parameters=reported_parameters(each.hypothesis, number, each.hypothesis.point),
+                parameters=report_parameters(each.hypothesis, number, each.hypothesis.point),
                 held_out_gain=min(each.gain, 1.0),
                 share_of_black_box=min(each.gain / most, 1.0),
                 why_not=each.why_not,

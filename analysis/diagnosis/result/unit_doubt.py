@@ -19,8 +19,8 @@ def unit_sentences(time_series: Sequence[TimeSeries]) -> tuple[str, ...]:
             if factor is not None and not 1 / UNIT_FACTOR < factor < UNIT_FACTOR:
                 found.setdefault(name, factor)
     return tuple(
-        f"{name} has the shape that the model predicts, but {_words(factor)}: its {_doubted(factor)}, the command's or "
-        "one in the model may be wrong."
+        f"{name} has the shape that the model predicts, but {_words(factor)}: its {_sign_or_unit(factor)}, the "
+        "command's or one in the model may be wrong."
         for name, factor in found.items()
     )
 
@@ -46,7 +46,7 @@ def _words(factor: float) -> str:
     return " and ".join([*texts, *(["with the other sign"] if factor < 0 else [])])
 
 
-def _doubted(factor: float) -> str:
+def _sign_or_unit(factor: float) -> str:
     return "sign" if -UNIT_FACTOR < factor < -1 / UNIT_FACTOR else "unit"
 
 

@@ -15,8 +15,8 @@ from analysis.diagnosis.result.candidate_wording import (
 )
 from analysis.diagnosis.result.ceiling_wording import (
     black_box_sentence,
-    ceiling_sentences,
     confirmation_sentence,
+    describe_ceiling,
     fall_text,
     one_error,
 )
@@ -27,10 +27,10 @@ from analysis.diagnosis.result.retuned_parameters import (
     MovedParameter,
     better_alone,
     better_model,
+    describe_raised_error,
+    describe_retuning,
     doubtful_sentences,
-    moved_parameters,
-    raised_sentence,
-    retuned_sentence,
+    find_moved_parameters,
 )
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 from analysis.diagnosis.unit_wording import probability_text, share_text
@@ -207,10 +207,10 @@ def summary_lines(found: Findings) -> tuple[str, ...]:
         lines.append(confirmation_sentence(diagnosis.fit.fit, diagnosis.fit.test))
     if diagnosis.verdict not in ("no_mismatch", "parameters"):
         lines += [
-            raised_sentence(diagnosis.fit.test),
-            retuned_sentence(moved, found.fitted),
+            describe_raised_error(diagnosis.fit.test),
+            describe_retuning(moved, found.fitted),
             remainder_sentence(diagnosis, device_of(found)),
-            *ceiling_sentences(found.reached),
+            *describe_ceiling(found.reached),
             black_box_sentence(found.black_box, bool(diagnosis.effects)),
             *candidate_sentences(diagnosis, device_of(found)),
         ]
@@ -227,7 +227,7 @@ def final_moved_parameters(found: Findings) -> tuple[MovedParameter, ...]:
     """The model's own parameters as they stand in the end, those that moved furthest first."""
     if found.tuning is None:
         return ()
-    return moved_parameters(found.tuning, found.explanation.after.fitted.deviations)
+    return find_moved_parameters(found.tuning, found.explanation.after.fitted.deviations)
 
 
 def signature_texts(found: Findings) -> Mapping[str, str]:

@@ -44,7 +44,7 @@ def comparison_of(context: SearchContext, best: BandPowerFit) -> BandPowerCompar
     power, model = BandPower(context.whole), context.tuning.tune(best.deviations)
 
     def predict(number: int) -> FloatArray:
-        return power.predict(context.whole.residuals(model, perturb(best.hypothesis, number).placed_effects()))
+        return power.predict(context.whole.residuals(model, perturb(best.hypothesis, number).list_placed_effects()))
 
     first, other = (np.asarray(each) for each in context.map_(predict, range(2)))
     differ = power.misfits(first - other)

@@ -1,7 +1,7 @@
 """Compares candidates: the best first fits are continued until they converge, then ordered by their errors.
 
 A Gauss-Newton fit converges about geometrically: after gains g1 and g2 of two steps the next one is predicted to gain
-g2 min(g2 / g1, 1). A fit ends when that is below a tolerance (`output_error.expected_gain`). The sensitivity to the
+g2 min(g2 / g1, 1). A fit ends when that is below a tolerance (`output_error.expect_gain`). The sensitivity to the
 model's own parameters costs one simulation each; it is kept from fit to fit, and recomputed only where a parameter has
 moved far from where it was computed. So all candidates can be compared at a small part of the cost of full fits, and
 only those within reach of the best are refined. Under forces that depend on the motion, a sensitivity without these, or
@@ -19,7 +19,7 @@ from analysis.diagnosis.errors.output_error import (
     Fitted,
     Sensitivity,
     evaluate_fit,
-    expected_gain,
+    expect_gain,
     fit,
     residuals_to_fit,
     sensitivity,
@@ -40,7 +40,7 @@ from analysis.diagnosis.settings import (
 SECOND_ROUNDS, WHOLE_ROUNDS = 4, 2
 MOST_POLISHED, POLISHED = 3, 0.002
 """Times at most that fits are polished, and share of the cost that must be gained to go on; each takes a simulation for
-every number of the model. By hand."""
+every parameter of the model. By hand."""
 MOST_REFRESHED, CONVERGED, CONVERGED_FAR, STALE = 4, 0.0005, 0.01, 0.5
 """The sensitivity to the model's parameters is recomputed so often, or until that gains no more than such a share, or,
 far above the noise, such a share of the logarithm of the error; and only where one of the parameters has moved by so
@@ -113,7 +113,7 @@ def _error_of(context: SearchContext, law: Fitted) -> float:
 
 
 def _is_timeless(law: Fitted) -> bool:
-    return not any(placed.effect.of_time for placed in law.hypothesis.placed_effects())
+    return not any(placed.effect.of_time for placed in law.hypothesis.list_placed_effects())
 
 
 def _is_same_start(context: SearchContext, law: Fitted, other: Fitted) -> bool:
@@ -231,7 +231,7 @@ def _refine_from(
     for _ in range(MOST_REFRESHED):
         better = fit(context.measure, context.tuning, best, there, SECOND_ROUNDS, context.map_)
         gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
-        best, expected, before = better, expected_gain(gained, before), gained
+        best, expected, before = better, expect_gain(gained, before), gained
         settled = (expected if complete else gained) < _least_gain(best)
         if (complete and settled) or (context.candidate(best).score.worst_channel <= NO_SECOND_START and settled):
             break

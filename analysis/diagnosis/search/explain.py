@@ -114,9 +114,10 @@ def explain(
 ) -> Explanation:
     """Re-tunes the model and adds effects one by one. time_left: asked before each piece of the search; what was found
     when it says no is kept. begun: per step of a search on fewer samples, it and its rivals; one effect is added to
-    these."""
+    these, up to `MOST_EFFECTS`."""
     found = begin(context, progress, begun)
-    return add_effects(context, catalogue, found, progress, time_left, len(found.rounds) + 1 if begun else MOST_EFFECTS)
+    most = min(len(found.rounds) + 1, MOST_EFFECTS) if begun else MOST_EFFECTS
+    return add_effects(context, catalogue, found, progress, time_left, most)
 
 
 def begin(context: SearchContext, progress: Progress, begun: Sequence[Sequence[FittedCandidate]] = ()) -> Explanation:
@@ -184,7 +185,8 @@ def is_worth_searching(context: SearchContext, found: Explanation, base: FittedC
         if judged_whole and len(base.fitted.hypothesis.claims) > 1 and leaves_little(found.retuned, base):
             return False
         beyond = 1.0 if context.references is None else context.references.beyond
-        return base.score.worst_channel > SEARCH_ON * beyond
+        # Opened samples are few among the others, and shown to hold a mismatch.
+        return base.score.worst_channel > (NOISE_ALONE if context.opened else SEARCH_ON) * beyond
     surprised = bool(np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     return surprised or context.references is not None or base.score.worst_channel > NOISE_ALONE
 

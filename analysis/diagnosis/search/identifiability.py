@@ -41,7 +41,7 @@ from equalizer.signals.signal import FloatArray
 _ABSENT = 1e-9
 
 
-def number_errors(context: SearchContext, found: Explanation) -> FloatArray:
+def parameter_errors(context: SearchContext, found: Explanation) -> FloatArray:
     """(parameters,): standard errors of the final hypothesis's point."""
     if found.statistic is not None:
         return found.statistic.errors
@@ -59,7 +59,7 @@ def final_errors(context: SearchContext, found: Explanation) -> FloatArray:
 def interval_errors(context: SearchContext, found: Explanation, noise: FloatArray) -> FloatArray:
     """(t + parameters,): standard errors for the intervals that are stated. noise: `final_errors`, or their profiles.
     To these comes what varies between segments, up to a few times the noise's: with few segments a jackknife has heavy
-    tails. A single segment tells nothing of that, and a factor stands for it."""
+    tails. A single segment has no such information, and a factor is used in its place."""
     last = (found.steps[-1] if found.steps else found.retuned).fitted
     if found.between is not None and found.between[0] is last:
         between = found.between[1]
@@ -200,29 +200,29 @@ def _parameters_with_none(
 
 def open_effects(context: SearchContext, found: Explanation) -> Iterator[bool]:
     """Whether an effect is open, by effect: the intervals of all its parameters that can mean no effect include it."""
-    for own in _parameters_with_none(found, number_errors(context, found)):
-        yield bool(own) and all(_is_open(number, at, error) for number, _, at, error in own)
+    for own in _parameters_with_none(found, parameter_errors(context, found)):
+        yield bool(own) and all(_is_open(free, at, error) for free, _, at, error in own)
 
 
-def _is_open(number: FreeParameter, at: float, error: float) -> bool:
+def _is_open(free: FreeParameter, at: float, error: float) -> bool:
     """Whether the parameter's interval contains the value that means no effect. error: standard error of its coordinate
     `at`."""
-    reach, away = _reach(number, at, error)
-    value, none = number.value(at), number.parameter.none or 0.0
+    reach, away = _reach(free, at, error)
+    value, none = free.value(at), free.parameter.none or 0.0
     return away <= _ABSENT * max(abs(value), abs(none)) or not reach <= away
 
 
-def _reach(number: FreeParameter, at: float, error: float) -> tuple[float, float]:
+def _reach(free: FreeParameter, at: float, error: float) -> tuple[float, float]:
     """Half width of the parameter's interval, and the distance of its value from no effect."""
-    value, none = number.value(at), number.parameter.none or 0.0
-    return 1.96 * INTERVAL_FACTOR * abs(number.value(at + error) - value), abs(value - none)
+    value, none = free.value(at), free.parameter.none or 0.0
+    return 1.96 * INTERVAL_FACTOR * abs(free.value(at + error) - value), abs(value - none)
 
 
 def distance_from_none(
     context: SearchContext, found: Explanation, effect: int, time_left: TimeBudget = always
 ) -> float:
-    """Distance of an effect's only number from no effect, in half widths of its profile interval; above 1, the interval
-    excludes no effect. effect: its place."""
+    """Distance of an effect's only parameter from no effect, in half widths of its profile interval; above 1, the
+    interval excludes no effect. effect: its place."""
     last = found.steps[-1].fitted
     fewer = found.retuned if len(found.steps) == 1 else without_effect(context, found, effect).steps[-1]
     # The re-tuned model, and at times the last step, is kept as it is on all samples. Both fits end at their minimum:

@@ -24,7 +24,7 @@ from analysis.diagnosis.errors.hypothesis import (
     hypothesis_of_claim,
     without_claim,
 )
-from analysis.diagnosis.errors.output_error import evaluate_fit, expected_gain, gather_evidence
+from analysis.diagnosis.errors.output_error import evaluate_fit, expect_gain, gather_evidence
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.band_power_comparison import (
@@ -146,7 +146,7 @@ def _with_second_effect(
 
 def _needs_gap(comparison: BandPowerComparison, view: View, best: BandPowerFit) -> bool:
     """Whether two bodies that touch without a gap, refitted, leave far more: the profile of the gap at zero."""
-    claim, placed = best.hypothesis.claims[0], best.hypothesis.placed_effects()[0]
+    claim, placed = best.hypothesis.claims[0], best.hypothesis.list_placed_effects()[0]
     free = claim.effect.parameters
     closed = replace(claim.effect, parameters=tuple(replace(p, fixed=p.fixed or p.name == "gap") for p in free))
     gap = next(p.lower for p in free if p.name == "gap")
@@ -187,7 +187,7 @@ def _refine(view: View, start: BandPowerFit) -> BandPowerFit:
         view = replace(view, by_deviations=_by_deviations(view, best))
         better = fit_band_power(view, best, STEPS)
         gained = 1 - better.cost / best.cost if best.cost > 0 else 0.0
-        best, expected, before = better, expected_gain(gained, before), gained
+        best, expected, before = better, expect_gain(gained, before), gained
         if expected <= GAINED:
             break
     return best

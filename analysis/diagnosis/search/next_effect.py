@@ -1,6 +1,8 @@
-"""One step of forward selection: which effects of the catalogue lower the error most beside those that are held.
+"""One step of forward selection: which effect of the catalogue lowers the error most when added to those selected so
+far.
 
-Screened by linearisation, fitted by output error, compared: steps 2 to 5 of the theory of operation in `explain`.
+Candidates are screened by linearisation, fitted by output error and compared: steps 2 to 5 of the theory of operation
+in `explain`.
 """
 
 from collections.abc import Sequence
@@ -44,7 +46,7 @@ class Step:
 def find_next_effect(
     context: SearchContext, catalogue: Sequence[Effect], base: Fitted, step: Step
 ) -> tuple[FittedCandidate, ...]:
-    """The candidates for one more effect beside those of `base`, the best first."""
+    """The fitted candidates for one more effect beside those of `base`, the preferred one first (`parsimony`)."""
     step.at(0.0)
     evidence = gather_evidence(context.measure, context.tuning, base)[0]
     fits = find_first_fits(context, catalogue, base, evidence, step)
@@ -62,7 +64,7 @@ def find_first_fits(
 ) -> list[Fitted]:
     """First fits of one more effect beside those of `base`, the best first. sites: places at which it must act; empty
     where it may act at any."""
-    told = [effect for effect in catalogue if context.measure.can_observe(effect)]
+    observable = [effect for effect in catalogue if context.measure.can_observe(effect)]
 
     def suggest(effects: Sequence[Effect], evidence: Evidence) -> list[Hypothesis]:
         suggested = _suggest_hypotheses(context, base.hypothesis, effects, evidence)
@@ -70,23 +72,23 @@ def find_first_fits(
 
     short_form = short_recordings_of(context, base)
     if short_form is None:
-        suggested = suggest(told, evidence)
+        suggested = suggest(observable, evidence)
         known = sensitivity_at(context, base.deviations, base.hypothesis, with_forces=True)
         step.at(0.2)
-        each = context.guard.over(context.map_, SCREENING)
-        screened = screen(context.measure, context.tuning, base, known, suggested, each)
+        guarded_map = context.guard.over(context.map_, SCREENING)
+        screened = screen(context.measure, context.tuning, base, known, suggested, guarded_map)
         return list(first_fits(context, base, known, screened))
-    timeless = suggest([effect for effect in told if not effect.of_time], short_form.of(evidence))
-    timed = suggest([effect for effect in told if effect.of_time], evidence)
+    time_invariant = suggest([effect for effect in observable if not effect.of_time], short_form.of(evidence))
+    time_varying = suggest([effect for effect in observable if effect.of_time], evidence)
     step.at(0.2)
-    return fits_on_short_recordings(context, short_form, base, timeless, timed)
+    return fits_on_short_recordings(context, short_form, base, time_invariant, time_varying)
 
 
 def compare_plausible(
     context: SearchContext, base: Fitted, fits: Sequence[Fitted], evidence: Evidence
 ) -> tuple[FittedCandidate, ...]:
-    """The candidates of these first fits, the preferred one first, without those that predict nothing beyond `base` or
-    hold what the data never visit."""
+    """The candidates of these first fits, the preferred one first, without those that predict nothing beyond `base` and
+    those with a parameter outside the range of the data (such as a limit above the largest command)."""
     return plainest_first(
         [
             candidate
@@ -100,7 +102,7 @@ def compare_plausible(
 def _suggest_hypotheses(
     context: SearchContext, held: Hypothesis, catalogue: Sequence[Effect], evidence: Evidence
 ) -> list[Hypothesis]:
-    """The hypotheses to try beside those that are held: each effect with its starting values, and drifts of the clock
+    """The hypotheses to try beside those of `held`: each effect with its starting values, and drifts of the clock
     by trial where there are reference recordings."""
     suggested = [
         hypothesis

@@ -1,5 +1,11 @@
-"""Parsimony: whether an effect is worth adding, whether errors tell two explanations apart, and which one is preferred
-where they do not: few parameters, a small re-tuning, an unrefined law."""
+"""Parsimony: whether an effect is worth adding, whether errors distinguish two explanations, and which one is preferred
+where they do not.
+
+Errors are compared by the mean log error power over channels (`FitScore.mean_log_error`, 0 = only noise). Its excess
+above the accuracy of the noise estimate, `NOISE_KNOWN_TO`, is what is left to explain. Where the errors of two
+candidates do not differ by more than chance, the one with the lower information criterion is preferred, and a special
+case before the law that contains it, unless the latter gains clearly.
+"""
 
 from collections.abc import Sequence
 
@@ -34,6 +40,7 @@ DRY_FRICTION = frozenset(
         "position_dependent_friction",
     }
 )
+"""Effects whose force opposes the motion and hardly depends on its speed."""
 
 FAMILIES: tuple[frozenset[str], ...] = (
     DRY_FRICTION,
@@ -44,10 +51,11 @@ FAMILIES: tuple[frozenset[str], ...] = (
     frozenset({"added_mass", "hand_impedance", "body_on_actuator"}),
     frozenset({"backlash", "loose_joint"}),
 )
+"""Effects of similar action: at one place, at most one of a family is named, and they are exchanged for one another."""
 
 
 def excludes(held: Claim, other: Claim) -> bool:
-    """Whether `other` cannot be added beside a claim that is part of the explanation."""
+    """Whether `other` cannot be added beside `held`: the same effect, or one of its family, at a common place."""
     if not set(held.sites) & set(other.sites):
         return False
     names = {held.effect.name, other.effect.name}
@@ -55,7 +63,8 @@ def excludes(held: Claim, other: Claim) -> bool:
 
 
 def relatives(name: str, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
-    """The effects that may stand in for the named one, itself among them: its family, and what refines it."""
+    """The effects that may replace the named one, itself included: its family, and the laws of which it is a special
+    case."""
     families = {name}.union(*(family for family in FAMILIES if name in family))
     return tuple(effect for effect in catalogue if effect.name in families or name in effect.simpler)
 
@@ -78,7 +87,9 @@ def _is_plainer(plain: FittedCandidate, other: FittedCandidate) -> bool:
 
 
 def _information_criterion(candidate: FittedCandidate) -> float:
-    """Akaike's information criterion (1974): two per number, and the squared deviations from the calibration."""
+    """2 k + |d|²: Akaike's penalty (1974) for k parameters, and the squared deviations d of the re-tuned parameters
+    from the calibration, in prior standard deviations. Without the likelihood: it is only used where errors do not
+    differ."""
     deviations = candidate.fitted.deviations
     return 2.0 * len(candidate.fitted.hypothesis.point) + float(deviations @ deviations)
 
@@ -89,7 +100,7 @@ def only_refines(other: FittedCandidate, plain: FittedCandidate) -> bool:
 
 
 def both_stand(named: FittedCandidate, other: FittedCandidate) -> bool:
-    """Whether the other is inseparable from the named candidate, and no refinement of it."""
+    """Whether the other is a rival: inseparable from the named candidate, and no refinement of it."""
     return inseparable(named, other) and not only_refines(other, named)
 
 
@@ -135,18 +146,19 @@ def _is_special_case(candidate: FittedCandidate, other: FittedCandidate) -> bool
 
 
 def _good_enough(plain: FittedCandidate, refined: FittedCandidate) -> bool:
+    """Whether the simpler candidate is preferred: inseparable from the other, or its special case from which the other
+    gains too little."""
     if not _is_special_case(plain, refined):
         return inseparable(refined, plain)
     gained = plain.score.mean_log_error - refined.score.mean_log_error
-    rubs = plain.newest in DRY_FRICTION
-    share = REFINED_FRICTION_SHARE if rubs else REFINED_SHARE
+    share = REFINED_FRICTION_SHARE if plain.newest in DRY_FRICTION else REFINED_SHARE
     return gained <= max(REFINED_GAIN, min(share * excess(plain), REFINED_MOST_GAIN))
 
 
 def leaves_far_less(candidate: FittedCandidate, rival: FittedCandidate) -> bool:
-    """Whether a law's excess error is so far below a named effect's that it replaces the name, and its error on
-    held-out samples is lower by more than the noise is known to: the same formula under a name of its own is no better.
-    Both with held-out errors on the same samples."""
+    """Whether a law outside the catalogue replaces a named effect: its excess error is at most the share `LAW_BEATS` of
+    the effect's, and its mean log rms error on the same held-out samples is lower by more than `NOISE_KNOWN_TO`. The
+    second condition refuses a law that is the effect's own formula in another form."""
     held_out, other = (float(np.mean(np.log(each.score.test))) for each in (candidate, rival))
     if np.isfinite(held_out) and held_out >= other - NOISE_KNOWN_TO:
         return False

@@ -16,9 +16,9 @@ import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis, combine
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, bounded_step, residuals_to_fit
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, residuals_to_fit, solve_bounded_step
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.settings import RETUNING_BOUND, STRONGEST_START, WEAKEST_START
+from analysis.diagnosis.settings import STRONGEST_START, WEAKEST_START
 from analysis.diagnosis.types import Mapper
 
 
@@ -47,14 +47,14 @@ def screen(
     def predict(hypothesis: Hypothesis) -> ScreenedHypothesis:
         whole = combine(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
-            there = residuals_to_fit(measure, measure.residuals(model, whole.placed_effects()))
-        return ScreenedHypothesis(whole, _predicted_cost(base, known, errors, errors - there))
+            there = residuals_to_fit(measure, measure.residuals(model, whole.list_placed_effects()))
+        return ScreenedHypothesis(whole, _predict_cost(base, known, errors, errors - there, tuning.bound))
 
     found: list[ScreenedHypothesis] = list(map_(predict, suggested))  # type: ignore[arg-type]
     return tuple(sorted(found, key=lambda screened: screened.cost))
 
 
-def _predicted_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray) -> float:
+def _predict_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change: np.ndarray, bound: float) -> float:
     """Predicted `Fitted.cost`; infinite where the simulation diverged or does not change. errors, change: (samples,)
     in units of the noise, e and c of the theory of operation."""
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
@@ -65,8 +65,8 @@ def _predicted_cost(base: Fitted, known: Sensitivity, errors: np.ndarray, change
     cross = known.on(change)
     products = np.block([[known.squares + np.eye(t), cross[:, None]], [cross[None, :], np.array([[strength]])]])
     gradient = np.concatenate([known.on(errors) - base.deviations, [float(change @ errors)]])
-    low = np.concatenate([-RETUNING_BOUND - base.deviations, [WEAKEST_START]])
-    high = np.concatenate([RETUNING_BOUND - base.deviations, [STRONGEST_START]])
-    step = bounded_step(products, gradient, low, high)
+    low = np.concatenate([-bound - base.deviations, [WEAKEST_START]])
+    high = np.concatenate([bound - base.deviations, [STRONGEST_START]])
+    step = solve_bounded_step(products, gradient, low, high)
     gain = 2 * float(step @ gradient) - float(step @ products @ step)
     return base.cost - gain / len(errors)

@@ -16,6 +16,9 @@ Theory of operation.
 5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`): before a second
    effect is looked for, as a law that alone explains is a shorter description than two effects, and at the end. A law
    that was found early and leaves a part is kept where the rest of the search names nothing.
+6. Where that still leaves a mismatch, or needs three effects, and a parameter of the model is at its bound, the search
+   is repeated with a wider one, and taken if it explains, by fewer effects: a model that was fitted to this device has
+   the missing physics as a bias.
 
 Reference recordings of the intact device: see `reference/search_with_reference`. Literature: Hastie, Tibshirani and
 Friedman, The Elements of Statistical Learning (2009), section 7.2 (training, validation, test), 3.3 (stepwise).
@@ -25,7 +28,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from analysis.diagnosis.effect_words import noun_of
-from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, begin, explain, is_worth_searching
@@ -39,6 +41,7 @@ from analysis.diagnosis.search.revise_selection import (
     exchange_for_relatives,
 )
 from analysis.diagnosis.search.search_context import (
+    FINER_PARTS,
     HALVES,
     FittedCandidate,
     SearchContext,
@@ -46,7 +49,14 @@ from analysis.diagnosis.search.search_context import (
 )
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from analysis.diagnosis.search.verdict import (
+    MILDER_TEST_USED,
+    MODEL_MOVED,
+    NOT_SHOWN,
+    ONLY_REFINES,
+    TEST_HALF_USED,
+    TEST_PARTS_USED,
     Judgement,
+    SearchResult,
     as_good_as_noise,
     confirms_addition,
     judge,
@@ -54,7 +64,6 @@ from analysis.diagnosis.search.verdict import (
 from analysis.diagnosis.settings import EXPLAINED_ERROR, MOST_EFFECTS
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
-from equalizer.signals.signal import FloatArray
 
 LAW_BEYOND = "a law outside the catalogue"
 HUM = "mains_hum"
@@ -71,58 +80,10 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
     return keep_identifiable(context, found, time_left)
 
 
-TEST_HALF_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
-    "such stretch was used to find it, the second half to confirm it."
-)
-TEST_PARTS_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold, each stretch in one half "
-    "alone: every other of several equal parts of each such stretch was used to find it, those between to confirm it."
-)
-MILDER_TEST_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold: all but the loudest of "
-    "it was used to find it, the loudest to confirm it."
-)
-NOT_SHOWN = "What was kept for the test shows a mismatch that the rest of the recording does not hold."
-
-
-ONLY_REFINES = (
-    "What explains it best is a law that was to be left out. Laws that hold it as a special case explain it as well, "
-    "but what they add to it does not show, so none of them is named."
-)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Unconfirmed:
-    """An effect that was found and is not named."""
-
-    hypothesis: Hypothesis
-    gain: float
-    """Share of the held-out error power that goes with it."""
-    why_not: str
-    claim: int = -1
-    """Which of the hypothesis's effects is meant."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SearchResult:
-    """Result of a search: the fits, the verdict, and candidates that are not named."""
-
-    context: SearchContext
-    """The search's shared state, with the roles of samples as used in the end."""
-    found: Explanation
-    judgement: Judgement
-    remarks: tuple[str, ...] = ()
-    errors: FloatArray | None = None
-    """`final_errors`, where the search needed them."""
-    unconfirmed: tuple[Unconfirmed, ...] = ()
-    """The largest gain first."""
-
-
 @dataclass(frozen=True, slots=True)
 class Beyond:
-    """What is tried where the catalogue leaves a mismatch. Each returns the search with what it names in place of the
-    catalogue's effects, or with candidates, or unchanged."""
+    """Searches beyond the catalogue, for a mismatch that it leaves. Each returns the result with its own effects named
+    in place of the catalogue's, with candidates, or unchanged."""
 
     before_pairs: Callable[[SearchResult], SearchResult] = lambda seen: seen
     """Before a second effect is looked for: names only what is a shorter description than two effects."""
@@ -139,6 +100,30 @@ def search_effects(
     beyond: Beyond = Beyond(),
 ) -> SearchResult:
     """The search for effects with its verdict."""
+    result = _search_within_calibration(context, catalogue, progress, time_left, beyond)
+    if not _may_move_further(result) or not time_left():
+        return result
+    progress("searching again, with a model that may move further", 0.1)
+    wider = replace(context, tuning=context.tuning.with_wider_bound())
+    again = _search_within_calibration(wider, catalogue, progress, time_left, Beyond())
+    fewer = result.judgement.verdict != "explained" or len(again.found.steps) < len(result.found.steps)
+    better = fewer and again.judgement.verdict == "explained"
+    return replace(again, remarks=(MODEL_MOVED, *again.remarks)) if better else result
+
+
+def _may_move_further(result: SearchResult) -> bool:
+    """Whether a mismatch is left, or three effects were needed, where a model was re-tuned as far as it may."""
+    context, found = result.context, result.found
+    left = result.judgement.verdict in ("unexplained", "partly_explained") or len(found.steps) == MOST_EFFECTS
+    fixed = found.statistic is not None or context.references is not None or context.certain
+    ends = (found.retuned, *found.steps, found.after)
+    return left and not fixed and any(context.tuning.is_at_bound(end.fitted.deviations) for end in ends)
+
+
+def _search_within_calibration(
+    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget, beyond: Beyond
+) -> SearchResult:
+    """The search with the model's own parameters within `Tuning.bound`."""
     beyond = Beyond(_guarded(beyond.before_pairs), _guarded(beyond.at_end))
     alone = add_effects(context, catalogue, begin(context, progress), progress, time_left, most=1)
     early = SearchResult(context, alone, Judgement("unexplained", False))
@@ -163,7 +148,7 @@ def _keep_early(early: SearchResult, result: SearchResult) -> SearchResult:
 
 
 def _guarded(add: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
-    """With the search unchanged where it crashes."""
+    """The search `add`, which returns its argument unchanged where it crashes."""
     return lambda seen: seen.context.guard.part(LAW_BEYOND, "its search", lambda: add(seen), seen)
 
 
@@ -188,6 +173,9 @@ def _search_with_pairs(
     if found.ended_early or found.barred or not shows_there_alone(left.score.test, left):
         return beyond(first)
     opened = _find_with_opened(first, left, catalogue, progress, time_left)
+    if _names_no_more(first, opened) and time_left():
+        finer = _find_with_opened(first, left, catalogue, progress, time_left, FINER_PARTS[-1])
+        opened = opened if _names_no_more(first, finer) else finer
     adds = _adds_confirmed(first, opened)
     if adds and (judged.named or opened.judgement.verdict == "explained"):
         there = beyond(opened)
@@ -201,7 +189,8 @@ def _search_with_pairs(
 def _find_beyond(
     first: SearchResult, opened: SearchResult, adds: bool, beyond: Callable[[SearchResult], SearchResult]
 ) -> SearchResult:
-    """What is found beyond the catalogue without the opened samples, or with them."""
+    """Result of the search beyond the catalogue: first without the opened held-out samples, then, where that names
+    nothing, with them."""
     tried = beyond(first)
     if tried.judgement.named:
         return tried
@@ -215,18 +204,30 @@ def _find_beyond(
 
 
 def _find_with_opened(
-    first: SearchResult, left: FittedCandidate, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+    first: SearchResult,
+    left: FittedCandidate,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget,
+    coarsest: int = HALVES,
 ) -> SearchResult:
     """The search repeated with a part of the held-out samples to fit and to choose by: all but the loudest stretches
-    where the others show the mismatch, else the first half of each, or every other of more parts."""
-    milder = first.context.open_milder(left)
-    context, parts = first.context.open_alternate(left) if milder is None else (milder, 0)
+    where the others show the mismatch, else the first half of each, or every other of more parts. coarsest: number of
+    parts from which on stretches are cut; beyond halves, the loudest are, too."""
+    milder = first.context.open_milder(left) if coarsest == HALVES else None
+    context, parts = first.context.open_alternate(left, coarsest) if milder is None else (milder, 0)
     going_on = left is first.found.after and as_good_as_noise(first.found)
     begun = first.found.rounds[: len(first.found.steps)] if going_on else ()
     found = explain(context, catalogue, progress, time_left, begun)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     used = {0: MILDER_TEST_USED, HALVES: TEST_HALF_USED}.get(parts, TEST_PARTS_USED)
     return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
+
+
+def _names_no_more(first: SearchResult, opened: SearchResult) -> bool:
+    """Whether a search with opened samples found no effect beyond the first: these may hold too little of it, such as
+    none of the few contacts with a stop."""
+    return _sites(opened.found.after) <= _sites(first.found.after)
 
 
 def _adds_confirmed(first: SearchResult, opened: SearchResult) -> bool:

@@ -15,7 +15,6 @@ from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
 from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.settings import (
     HELD_OUT_ALONE_ERROR,
-    HELD_OUT_ALONE_TIMES,
     LEAST_FITTED,
     LOUDER,
     MOST_FITTED,
@@ -53,9 +52,9 @@ class FittedCandidate:
         return np.inf if np.isnan(left) else left
 
 
-HALVES, FINER_PARTS = 2, (8, 32)
+HALVES, FINER_PARTS = 2, (8, 32, 128)
 """Parts into which held-out stretches are cut where some are opened; finer ones only where coarser ones do not leave
-the mismatch in both. A thirty-second of some seconds is longer than errors are correlated."""
+the mismatch in both, or nothing is found with these. A 128th of some seconds is as long as a contact with a stop."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,15 +79,15 @@ class SearchContext:
     opened: bool = False
     """A part of the held-out samples is used to fit and to choose by."""
 
-    def open_alternate(self, shows: FittedCandidate) -> "tuple[SearchContext, int]":
+    def open_alternate(self, shows: FittedCandidate, coarsest: int = HALVES) -> "tuple[SearchContext, int]":
         """Copy of the context in which a part of every held-out stretch is used to fit and to choose by, and into how
         many parts stretches were cut: the first of two, or, where one half alone shows the mismatch (as of a sweep),
-        every other of more. shows: as of `open_milder`."""
-        for parts in (HALVES, *FINER_PARTS):
+        every other of more. shows: as of `open_milder`. coarsest: least number of parts that is tried."""
+        for parts in (count for count in (HALVES, *FINER_PARTS) if count >= coarsest):
             opened = [record.every_other_part(parts) for record in self.whole.records]
             if self._both_show(opened, shows):
                 return self._open(opened), parts
-        return self._open([record.every_other_part(HALVES) for record in self.whole.records]), HALVES
+        return self._open([record.every_other_part(coarsest) for record in self.whole.records]), coarsest
 
     def open_milder(self, shows: FittedCandidate) -> "SearchContext | None":
         """Copy of the context in which all held-out segments but the loudest are used to fit and to choose by, where
@@ -146,7 +145,7 @@ def shows_there_alone(errors: FloatArray, candidate: FittedCandidate) -> bool:
     """Whether held-out samples show a mismatch that those to fit and to choose by do not. errors: (c,), there, times
     the noise."""
     shown = float(np.nanmax(errors, initial=0.0))
-    return shown > HELD_OUT_ALONE_ERROR and shown > HELD_OUT_ALONE_TIMES * candidate.score.worst_channel
+    return shown > HELD_OUT_ALONE_ERROR * max(candidate.score.worst_channel, 1.0)
 
 
 def first_fits(
@@ -177,8 +176,8 @@ def sensitivity_at(
     plain = sensitivity(context.measure, context.tuning, deviations, kept, context.map_)
     if not with_forces or kept is hypothesis:
         return plain
-    felt = sensitive_parameters(context.measure, context.tuning, plain, hypothesis)
-    return sensitivity(context.measure, context.tuning, deviations, hypothesis, context.map_, (plain.columns, felt))
+    sensed = sensitive_parameters(context.measure, context.tuning, plain, hypothesis)
+    return sensitivity(context.measure, context.tuning, deviations, hypothesis, context.map_, (plain.columns, sensed))
 
 
 def _worth_fitting(base: Fitted, screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
@@ -199,14 +198,13 @@ def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedH
     return [entry for _, entry in sorted(ranked, key=lambda pair: pair[0])]
 
 
-# Selects the model's parameters that matter for a force at an axis: those that change how that axis moves.
 def sensitive_parameters(
     measure: ErrorMeasure, tuning: Tuning, plain: Sensitivity, hypothesis: Hypothesis
 ) -> list[int]:
     """Parameters whose sensitivity changes with the hypothesis's forces: those that move the axes at which these act.
     plain: sensitivity without motion-dependent forces."""
     forces = [
-        effect for effect in hypothesis.placed_effects() if isinstance(effect.effect.acts, (AxisForce, JointForce))
+        effect for effect in hypothesis.list_placed_effects() if isinstance(effect.effect.acts, (AxisForce, JointForce))
     ]
     model = tuning.tune(np.zeros(len(tuning.names)))
     if not forces or any(isinstance(force.effect.acts, JointForce) for force in forces):
@@ -214,11 +212,11 @@ def sensitive_parameters(
     reached = np.abs(model.output @ np.linalg.solve(model.mass, model.input))
     sites = {site for force in forces for site in force.sites}
     strength = _strengths(measure, plain.columns, model.outputs)
-    felt = np.zeros(len(tuning.names), dtype=bool)
+    sensed = np.zeros(len(tuning.names), dtype=bool)
     for site in sites:
         in_channel = strength[:, int(np.argmax(reached[:, site]))]
-        felt |= in_channel > SENSED_SHARE * in_channel.max(initial=0.0)
-    return np.flatnonzero(felt).tolist()
+        sensed |= in_channel > SENSED_SHARE * in_channel.max(initial=0.0)
+    return np.flatnonzero(sensed).tolist()
 
 
 def _strengths(measure: ErrorMeasure, columns: FloatArray, outputs: int) -> FloatArray:

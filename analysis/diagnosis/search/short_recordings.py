@@ -26,7 +26,7 @@ from analysis.diagnosis.errors.output_error import (
 from analysis.diagnosis.forces.inverse_dynamics import band_motion
 from analysis.diagnosis.forces.inverse_response import zeros_of
 from analysis.diagnosis.forces.predicted_force import PredictedForce
-from analysis.diagnosis.noise.periods import settled_periods
+from analysis.diagnosis.noise.periods import find_settled_periods
 from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
 from analysis.diagnosis.search.search_context import FITTING, SCREENING, SearchContext, first_fits, sensitivity_at
 from analysis.diagnosis.settings import RUN_IN_CONSTANTS, RUN_IN_ERROR, SHORT_SHARE, WORTH_FITTING
@@ -127,7 +127,7 @@ def short_recordings_of(context: SearchContext, held: Fitted) -> ShortRecordings
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
         return None
-    placed = held.hypothesis.placed_effects()
+    placed = held.hypothesis.list_placed_effects()
     if any(each.effect.of_time for each in (*measure.known, *placed)):
         return None
     remembers = any(isinstance(each.effect.acts, (AxisForce, JointForce)) for each in (*measure.known, *placed))
@@ -169,7 +169,7 @@ def _shorten(
 def _continue_from(short: ShortRecordings, measure: FreeSimulation, held: Fitted) -> ShortRecordings:
     """The shortened recordings, each piece begun in the state that the whole simulation of a fit has there."""
     records = [record for record in measure.records if record.fit.any()]
-    model, effects = short.context.tuning.tune(held.deviations), held.hypothesis.placed_effects()
+    model, effects = short.context.tuning.tune(held.deviations), held.hypothesis.list_placed_effects()
     pieces = []
     for record, kept in zip(records, short.kept, strict=True):
         begun = np.flatnonzero(np.diff(kept, prepend=-2) > 1)
@@ -200,7 +200,7 @@ def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) 
 def _last_periods(record: Observed) -> tuple[Mask, Places]:
     """`fit` and `repeat_of` of a `_Cut`: of each settled segment the last period is fitted."""
     fit, repeat_of = record.fit.copy(), np.arange(len(record.fit))
-    for periods in settled_periods(record.recording):
+    for periods in find_settled_periods(record.recording):
         inside = slice(periods.segment.start, periods.segment.stop)
         last = slice(periods.starts[-1], periods.starts[-1] + periods.length)
         if periods.settled and fit[inside].any() and last.stop <= len(fit) and record.fit[last].all():

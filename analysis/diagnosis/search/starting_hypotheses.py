@@ -86,9 +86,9 @@ def _faint(effect: Effect, values: Values) -> Values:
     return {**values, main.name: values[main.name] / 10 if main.none == 0 else values[main.name]}
 
 
-# Starting values for clock drift by grid search, for recordings too short to show the growing delay.
 def clock_drift_by_trial(catalogue: Sequence[Effect], evidence: Evidence) -> tuple[Hypothesis, ...]:
-    """Empty where the effect's own estimator finds some, where it may not be named, or where no trial is better."""
+    """Starting values for clock drift by grid search, for recordings too short to show the growing delay. Empty where
+    the effect's own estimator finds some, where it may not be named, or where no trial is better."""
     effect = next((known for known in catalogue if known.name == CLOCK_DRIFT), None)
     if effect is None or effect.starts(evidence, ALL_SITES):
         return ()

@@ -1,4 +1,4 @@
-"""The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained."""
+"""The verdict on a finished search: no mismatch, wrong parameters, named physics, or unexplained; and remarks on it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.diagnosis.document import Verdict
+from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import leaves_little, share_of_mismatch
-from analysis.diagnosis.search.search_context import FittedCandidate
+from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import (
     CONFIRMED_SHARE,
     EXPLAINED_BY_CHANCE,
@@ -20,6 +21,30 @@ from analysis.diagnosis.settings import (
     NAMED_GAIN,
     NAMED_SHARE,
     NOISE_ALONE,
+    WIDER_RETUNING_BOUND,
+)
+from equalizer.signals.signal import FloatArray
+
+TEST_HALF_USED = (
+    "What was kept for the test shows something that the rest of the recording does not hold: the first half of each "
+    "such stretch was used to find it, the second half to confirm it."
+)
+TEST_PARTS_USED = (
+    "What was kept for the test shows something that the rest of the recording does not hold, each stretch in one half "
+    "alone: every other of several equal parts of each such stretch was used to find it, those between to confirm it."
+)
+MILDER_TEST_USED = (
+    "What was kept for the test shows something that the rest of the recording does not hold: all but the loudest of "
+    "it was used to find it, the loudest to confirm it."
+)
+NOT_SHOWN = "What was kept for the test shows a mismatch that the rest of the recording does not hold."
+ONLY_REFINES = (
+    "What explains it best is a law that was to be left out. Laws that hold it as a special case explain it as well, "
+    "but what they add to it does not show, so none of them is named."
+)
+MODEL_MOVED = (
+    f"The model's own parameters were let move by up to {WIDER_RETUNING_BOUND:g} standard deviations of their "
+    "calibration, as less left a mismatch: it may have been fitted to a device that had the missing physics already."
 )
 
 
@@ -30,6 +55,33 @@ class Judgement:
     verdict: Verdict
     named: bool
     """The effects of `Explanation.after` are to be named."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Unconfirmed:
+    """An effect that was found and is not named."""
+
+    hypothesis: Hypothesis
+    gain: float
+    """Share of the held-out error power that goes with it."""
+    why_not: str
+    claim: int = -1
+    """Which of the hypothesis's effects is meant."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchResult:
+    """Result of a search: the fits, the verdict, and candidates that are not named."""
+
+    context: SearchContext
+    """The search's shared state, with the roles of samples as used in the end."""
+    found: Explanation
+    judgement: Judgement
+    remarks: tuple[str, ...] = ()
+    errors: FloatArray | None = None
+    """`final_errors`, where the search needed them."""
+    unconfirmed: tuple[Unconfirmed, ...] = ()
+    """The largest gain first."""
 
 
 def judge(found: Explanation) -> Judgement:

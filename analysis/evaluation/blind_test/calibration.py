@@ -65,7 +65,7 @@ def _calibration_error(stated: FloatArray, right: FloatArray) -> float:
 
 
 def _average_ties(stated: FloatArray, right: FloatArray) -> FloatArray:
-    """Right answers of equal probabilities, spread evenly over them."""
+    """Share of right answers among those of equal stated probability, (n,): ties are averaged."""
     _, group = np.unique(np.round(stated, TIED), return_inverse=True)
     mean: FloatArray = np.bincount(group, weights=right) / np.bincount(group)
     return np.asarray(mean[group])

@@ -9,9 +9,9 @@ from analysis.evaluation.blind_test.outcome import DETECTABLE, Outcome
 from analysis.evaluation.blind_test.share import wilson
 
 PARTS = 10
-"""Bins of the detection curve over strength, with equally many cases each."""
+"""Bins of the detection curve, with equally many cases each. By hand."""
 LEAST_DRAWS = 3
-"""Fewest draws for a line fit."""
+"""Fewest draws for a line fit. By hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,8 @@ def detection_strips(singles: Sequence[Outcome]) -> tuple[EffectDraws, ...]:
 
 def ideal_threshold(draws: Sequence[Outcome]) -> float | None:
     """The strength (0 to 1) from which an ideal observer detects an effect, by a line fit: strength is the logarithm of
-    the effect's parameter, and what it adds grows about as a power of that. None where too few draws tell it."""
+    the effect's parameter, and what it adds grows about as a power of that. None with fewer than `LEAST_DRAWS` draws,
+    or where what is added does not grow."""
     known = [(draw.strengths[0], np.log(draw.adds)) for draw in draws if draw.adds > 0]
     strengths = [strength for strength, _ in known]
     if len(known) < LEAST_DRAWS or np.ptp(strengths) == 0:

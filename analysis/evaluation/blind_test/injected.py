@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args
 from analysis.evaluation.blind_test.share import Figure, share
 
 DETECTABLE = 1.25
-"""Times that the held-out error of the device's base model changes, up or down, from which on a fault ought to be
-seen."""
+"""Factor by which a fault must change the held-out error of the device's base model, up or down, to count as
+detectable. By hand."""
 Judged = Literal["named", "in class", "other name, right place", "wrong", "unnamed", "nothing named"]
 JUDGED: tuple[Judged, ...] = get_args(Judged)
 
@@ -49,18 +49,21 @@ class InjectedOutcome:
 
     @property
     def judged(self) -> Judged:
-        """Judgement by the worst of the names. With two faults at once, naming one of them is right, and the other is
-        left open."""
+        """Class of the answer, by the worst of its names: every name is an injected fault ("named"); an injected fault
+        is in the returned set ("in class"); the other names are at the right places; or "wrong". With two faults at
+        once, naming one of them is right."""
         if not self.effects:
             return "wrong" if self.named or self.failed else "nothing named"
         if not self.named:
             return "unnamed"
-        strange = [place for name, place in zip(self.named, self.named_places, strict=True) if name not in self.effects]
-        if not strange:
+        other_places = [
+            place for name, place in zip(self.named, self.named_places, strict=True) if name not in self.effects
+        ]
+        if not other_places:
             return "named"
         if set(self.effects) & set(self.returned) and len(self.named) <= len(self.effects):
             return "in class"
-        return "other name, right place" if set(strange) <= set(self.places) else "wrong"
+        return "other name, right place" if set(other_places) <= set(self.places) else "wrong"
 
     @property
     def right(self) -> bool:
@@ -115,6 +118,7 @@ class Tally:
 
     what: str
     drawn: int
+    """Number of injected faults, detectable or not."""
     counts: tuple[int, ...]
     """Number of detectable faults per entry of JUDGED without its last."""
     right: Figure
@@ -132,13 +136,13 @@ def tallies(outcomes: Sequence[InjectedOutcome], key: Callable[[InjectedOutcome]
 
 def _tally(name: str, outcomes: Sequence[InjectedOutcome]) -> Tally:
     faults = [outcome for outcome in outcomes if outcome.effects]
-    asked = [fault for fault in faults if fault.detectable]
+    detectable = [fault for fault in faults if fault.detectable]
     nothing = [outcome for outcome in outcomes if not outcome.effects]
-    counts = tuple(sum(each.judged == judged for each in asked) for judged in JUDGED[:-1])
+    counts = tuple(sum(each.judged == judged for each in detectable) for judged in JUDGED[:-1])
     return Tally(
         name,
         len(faults),
         counts,
-        share(name, asked, lambda each: each.right),
+        share(name, detectable, lambda each: each.right),
         share(name, nothing, lambda each: each.right),
     )

@@ -2,7 +2,8 @@
 
 A change is right where the diagnosis returns one of the effects that it may show as: a loosened cable is backlash or a
 loose joint, depending on its slack. The control, a change that changes nothing, counts against a diagnosis that names
-anything. A value that was weighed or measured beforehand is compared with the 95 % interval of the first parameter.
+anything. A value that was weighed or measured beforehand is compared with the 95 % interval of the first parameter; a
+value of a change without a unit is kept in the table and compared with nothing.
 """
 
 from collections.abc import Sequence
@@ -89,19 +90,19 @@ class Scored:
     named: str
     """Effects that the diagnosis names, separated by spaces."""
     returned: str
-    """Effects that it holds for possible, separated by spaces."""
+    """Effects of its returned set (the named ones and their inseparable rivals), separated by spaces."""
     right: bool
     inside: bool | None
-    """Whether the written value lies in the 95 % interval of the effect named; None where no value was written or the
-    effect was not named."""
+    """Whether the written value lies in the 95 % interval of the effect named; None where no value was written, the
+    change has no unit, or the effect was not named."""
 
 
 def score_label(label: Label, diagnosis: Diagnosis) -> Scored:
     """Score a diagnosis: right where one of the change's effects is in the returned set; for no change, where no effect
     is named."""
-    wanted = CHANGES_BY_NAME[label.change].effects
+    change = CHANGES_BY_NAME[label.change]
     named = tuple(effect.effect for effect in diagnosis.effects)
-    right = any(each in diagnosis.returned_set for each in wanted) if wanted else not named
+    right = any(each in diagnosis.returned_set for each in change.effects) if change.effects else not named
     return Scored(
         label.recording,
         label.change,
@@ -110,22 +111,24 @@ def score_label(label: Label, diagnosis: Diagnosis) -> Scored:
         " ".join(named),
         " ".join(diagnosis.returned_set),
         right,
-        _is_in_interval(label, diagnosis, wanted),
+        _is_in_interval(label.value, change, diagnosis),
     )
 
 
 def score_unanswered(label: Label) -> Scored:
-    """Score a missing diagnosis as wrong, with its number in no interval, so that leaving one out raises no rate."""
+    """Score a missing diagnosis as wrong, with its value in no interval, so that leaving one out raises no rate."""
     written = label.value is not None and bool(CHANGES_BY_NAME[label.change].unit)
     return Scored(label.recording, label.change, label.value, MISSING, "", "", False, False if written else None)
 
 
-def _is_in_interval(label: Label, diagnosis: Diagnosis, wanted: Sequence[str]) -> bool | None:
-    """As `Scored.inside`; asked of the first of the wanted effects alone, whose parameter has the value's unit."""
+def _is_in_interval(value: float | None, change: Change, diagnosis: Diagnosis) -> bool | None:
+    """As `Scored.inside`, for the first of the change's effects alone, whose first parameter has the value's unit."""
+    if value is None or not change.unit:
+        return None
     for effect in diagnosis.effects:
         ends = next(iter(effect.parameters.values())).ci95 if effect.parameters else None
-        if effect.effect == next(iter(wanted), "") and ends is not None and label.value is not None:
-            return ends[0] <= label.value <= ends[1]
+        if effect.effect == change.effects[0] and ends is not None:
+            return ends[0] <= value <= ends[1]
     return None
 
 

@@ -30,12 +30,13 @@ class AnsweredCase:
     kind: str
     axes: tuple[str, ...]
     adds: float
-    """Change of the readings by what is concealed, simulated: rms over the noise's rms, in the worst channel."""
+    """Change of the readings by what is concealed, simulated: its rms over the noise's rms, in the worst channel."""
     diagnosis: Diagnosis | None
-    """The diagnosis; None: it failed."""
+    """The diagnosis; None where it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
     """Rms error on held-out samples over the noise's rms: by stage ("before", "retuned", "after"), then by channel."""
     seconds: float
+    """Duration of the diagnosis (s)."""
 
     @property
     def verdict(self) -> str:
@@ -64,7 +65,7 @@ class Outcome(AnsweredCase):
     """Origin of the model: calibrated, or re-tuned to the device."""
     concealed: tuple[Concealed, ...]
     strengths: tuple[float, ...]
-    """0 = the weakest that is drawn, 1 = the strongest."""
+    """Of each concealed effect: 0 = the weakest that is drawn, 1 = the strongest."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -89,10 +90,11 @@ class Outcome(AnsweredCase):
 
     @property
     def right(self) -> bool:
-        """Whether exactly the concealed effects are named; their places and parameters are scored elsewhere."""
+        """Whether exactly the concealed effects are named; their places and parameters are scored elsewhere. A failed
+        diagnosis names none: see `score.is_miss`, which counts it."""
         return sorted(self.named_names) == sorted(self.names)
 
     @property
     def returned(self) -> tuple[str, ...]:
-        """The set of effects that the diagnosis holds for possible; empty where it failed."""
+        """The returned set: the named effects and their inseparable rivals; empty where the diagnosis failed."""
         return () if self.diagnosis is None else self.diagnosis.returned_set

@@ -10,7 +10,7 @@ from analysis.diagnosis.document import NamedEffect
 from analysis.evaluation.blind_test.calibration import Calibration, calibration
 from analysis.evaluation.blind_test.follow_up import FollowUp, follow_up_figures
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
-from analysis.evaluation.blind_test.share import Figure, pooled_share, share, statistic
+from analysis.evaluation.blind_test.share import Figure, pool_share, share, statistic
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 TURN = 2 * math.pi
@@ -140,7 +140,7 @@ def _number_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     errors = [main_error(each.concealed[0], each.named[0]) for each in right]
     yield statistic("main parameter's error, median", [e for e in errors if e is not None], np.median)
     covered = [list(interval_coverage(each.concealed[0], each.named[0]).values()) for each in right]
-    yield pooled_share("true value in the 95 % interval", covered)
+    yield pool_share("true value in the 95 % interval", covered)
     mains = [
         each
         for each in right

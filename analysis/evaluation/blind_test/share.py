@@ -42,7 +42,7 @@ def wilson(hits: float, of: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def pooled_share(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
+def pool_share(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
     """Pooled share of dependent groups: groups are resampled as a whole (cluster bootstrap)."""
     hits = np.array([sum(group) for group in groups if group], dtype=np.float64)
     of = np.array([len(group) for group in groups if group], dtype=np.float64)

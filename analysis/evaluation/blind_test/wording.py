@@ -14,7 +14,7 @@ def figure_text(figure: Figure) -> str:
     return f"{100 * figure.value:.1f} % [{low:.0f}, {high:.0f}], {figure.hits} of {figure.of}"
 
 
-def concealed_text(outcome: Outcome) -> str:
+def describe_concealed(outcome: Outcome) -> str:
     """The concealed effects with their axes; "nothing" where there are none."""
     return " + ".join(f"{c.effect}{f' of {c.axis}' if c.axis else ''}" for c in outcome.concealed) or "nothing"
 

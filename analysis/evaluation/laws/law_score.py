@@ -35,7 +35,7 @@ def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
         share("function within 5 % on louder commands", shown, lambda each: each.close_louder),
         share("wrong law explained, of laws that show", shown, lambda each: each.wrongly_explained),
         share("wrong law explained, of laws named", with_names, lambda each: each.wrongly_explained),
-        share("a name of the catalogue explained instead", shown, _explained_by_other_effect),
+        share("a name of the catalogue explained instead", shown, _is_explained_by_other_effect),
         share("a law named where nothing is missing", nulls, lambda each: each.false_law),
         share("a law named on decoys", others, lambda each: each.false_law),
         statistic("median processor seconds, laws", [each.seconds for each in laws], np.median),
@@ -44,5 +44,5 @@ def law_score(outcomes: Sequence[LawOutcome]) -> LawScore:
     return LawScore(figures, tuple(each for each in outcomes if each.missed))
 
 
-def _explained_by_other_effect(outcome: LawOutcome) -> bool:
+def _is_explained_by_other_effect(outcome: LawOutcome) -> bool:
     return outcome.verdict == "explained" and bool(outcome.names) and not outcome.named

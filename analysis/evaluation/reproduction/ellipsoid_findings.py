@@ -28,7 +28,7 @@ def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
         if result.phasor.off_axis_ratio is not None
     }
     findings = (
-        *(_coupling_finding(result) for result in results),
+        *(_find_coupling(result) for result in results),
         _low_frequency_finding(coupling),
         _high_frequency_finding(coupling),
     )
@@ -44,7 +44,7 @@ def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
     )
 
 
-def _coupling_finding(result: EllipsoidResult) -> Finding:
+def _find_coupling(result: EllipsoidResult) -> Finding:
     ratio, axes = result.phasor.off_axis_ratio, result.moments.normalised_axes
     along = "" if ratio is None else f"off the direction over along it {100 * ratio:.0f} %; "
     return Finding(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.evaluation.reproduction.document import FigureFindings, Finding
-from analysis.evaluation.reproduction.played_response import PlayedResponse, played_row
+from analysis.evaluation.reproduction.played_response import PlayedResponse, describe_played
 from analysis.wording import number
 from equalizer.signals.signal import ComplexArray, FloatArray
 
@@ -50,7 +50,7 @@ class EqualizedRows:
         )  # fmt: skip
 
 
-def equalized_findings(
+def find_equalized(
     rows: EqualizedRows, held_out: tuple[float, float] | None, remarks: tuple[str, ...] = ()
 ) -> FigureFindings:
     """Findings of figure 5. held_out: error of the centre's model on what was kept from it, and the same of the device
@@ -61,7 +61,7 @@ def equalized_findings(
         _worst_coupling("Worst coupling of any line, centre", rows.plain, rows.equalized),
         _edge_flat(rows),
         _edge_coupling(rows),
-        _blended_forces(rows),
+        _find_blended_forces(rows),
         _friction(rows),
         _held_out_finding(held_out),
     )
@@ -121,7 +121,7 @@ def _peaks(rows: EqualizedRows) -> Finding:
 
 
 def _worst_coupling(what: str, before: PlayedResponse, after: PlayedResponse) -> Finding:
-    first, second = played_row(before).coupling_db, played_row(after).coupling_db
+    first, second = describe_played(before).coupling_db, describe_played(after).coupling_db
     return Finding(
         what=what,
         published="",
@@ -133,12 +133,12 @@ def _worst_coupling(what: str, before: PlayedResponse, after: PlayedResponse) ->
 
 
 def _edge_flat(rows: EqualizedRows) -> Finding:
-    before, after = played_row(rows.edge_plain).flatness_db, played_row(rows.edge).flatness_db
+    before, after = describe_played(rows.edge_plain).flatness_db, describe_played(rows.edge).flatness_db
     return Finding(
         what="Flatness at the edge, model of the centre",
         published="remains fairly flat",
         here=f"{number(before, 1)} dB without, {number(after, 1)} dB with the equalizer (centre: "
-        f"{number(played_row(rows.equalized).flatness_db, 1)} dB)",
+        f"{number(describe_played(rows.equalized).flatness_db, 1)} dB)",
         value=after,
         unit="dB",
         as_published=after <= before / 2,
@@ -147,8 +147,8 @@ def _edge_flat(rows: EqualizedRows) -> Finding:
 
 
 def _edge_coupling(rows: EqualizedRows) -> Finding:
-    before, after = played_row(rows.edge_plain).coupling_db, played_row(rows.edge).coupling_db
-    centre = played_row(rows.plain).coupling_db - played_row(rows.equalized).coupling_db
+    before, after = describe_played(rows.edge_plain).coupling_db, describe_played(rows.edge).coupling_db
+    centre = describe_played(rows.plain).coupling_db - describe_played(rows.equalized).coupling_db
     return Finding(
         what="Coupling at the edge, model of the centre",
         published="still a minor improvement",
@@ -160,8 +160,8 @@ def _edge_coupling(rows: EqualizedRows) -> Finding:
     )
 
 
-def _blended_forces(rows: EqualizedRows) -> Finding:
-    found = played_row(rows.edge_blended)
+def _find_blended_forces(rows: EqualizedRows) -> Finding:
+    found = describe_played(rows.edge_blended)
     return Finding(
         what="The same place, forces blended between models of other places (ours)",
         published="named as a possibility, not tried",
@@ -173,7 +173,7 @@ def _blended_forces(rows: EqualizedRows) -> Finding:
 
 
 def _friction(rows: EqualizedRows) -> Finding:
-    with_it, without = played_row(rows.broad), played_row(rows.frictionless)
+    with_it, without = describe_played(rows.broad), describe_played(rows.frictionless)
     return Finding(
         what="What friction costs, all frequencies at once (ours)",
         published="",

@@ -33,7 +33,7 @@ class PlayedResponse:
     multiply_adds: int | None = None
 
 
-def wanted_wave(
+def make_wanted_wave(
     kind: SignalKind, band_hz: tuple[float, float], period: int, sample_rate_hz: float, seed: int
 ) -> FloatArray:
     """A period (period,) of the wanted signal, with a peak of 1 and nothing outside the band."""
@@ -87,7 +87,7 @@ def coupling_db(response: ComplexArray) -> FloatArray:
     return ratio
 
 
-def played_row(played: PlayedResponse) -> PlayedRow:
+def describe_played(played: PlayedResponse) -> PlayedRow:
     """The response's figures of merit as a row of the document. error: rms departure from the identity matrix, per
     axis."""
     found = measure_quality(played.response)

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.evaluation.reproduction.study_findings import LIMIT_RULE
-from analysis.wording import signed_number
+from analysis.wording import format_signed
 from equalizer.identification.frequency_response.coupling_onset import CouplingOnset
 from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
@@ -153,7 +153,7 @@ def _slope(response: FrequencyResponse) -> Finding | None:
     return Finding(
         what=f"Slope along the axes, {low:g} to {high:g} Hz",
         published="rises: friction and damping rule below 10 Hz",
-        here=f"{signed_number(slope, 1)} dB per octave (a free mass: 0)",
+        here=f"{format_signed(slope, 1)} dB per octave (a free mass: 0)",
         value=slope,
         unit="dB",
         as_published=slope > 1.0,

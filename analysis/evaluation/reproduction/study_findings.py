@@ -7,7 +7,7 @@ from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.psychophysics.comparisons import PairDifference
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.threshold_table import frequency_name
-from analysis.wording import signed_number
+from analysis.wording import format_signed
 
 SIGNIFICANT_P = 0.05
 """Level of significance of the published analysis."""
@@ -71,7 +71,7 @@ def study_findings(analysis: StudyAnalysis) -> FigureFindings:
         _rise(means, 5.0, 15.0, "apparently up, not significant with ten participants", significant=False),
         _rise(means, 15.0, 25.0, "apparently up, not significant", significant=False),
         _rise(means, 5.0, 35.0, "significantly up at 35 Hz (p < 0.05)", significant=True),
-        _censoring_finding(means, analysis),
+        _find_censoring(means, analysis),
         _similar(means),
     ]
     return FigureFindings(
@@ -110,7 +110,7 @@ def _rise(means: _Means, low_hz: float, high_hz: float, published: str, signific
     return Finding(
         what=f"From {low_hz:g} to {high_hz:g} Hz",
         published=published,
-        here=f"{signed_number(pair.difference)} N, p {_p_text(pair.p)} (all pairs at once)",
+        here=f"{format_signed(pair.difference)} N, p {_p_text(pair.p)} (all pairs at once)",
         value=pair.difference,
         unit="N",
         as_published=up and (pair.p < SIGNIFICANT_P) == significant,
@@ -118,7 +118,7 @@ def _rise(means: _Means, low_hz: float, high_hz: float, published: str, signific
     )
 
 
-def _censoring_finding(means: _Means, analysis: StudyAnalysis) -> Finding | None:
+def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
     if 35.0 not in analysis.table.frequencies_hz:
         return None
     cut, all_of_them = means.cut(35.0), len(analysis.table.subjects)

@@ -7,7 +7,7 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.residual_spectrum import remainder_spectra
 from analysis.diagnosis.search.guard import Guard, Part
 from analysis.figures.diagnosis.held_out import held_out_picture
-from analysis.figures.diagnosis.mismatch_map import driving_inputs, mismatch_map_picture
+from analysis.figures.diagnosis.mismatch_map import mismatch_map_picture, rank_driving_inputs
 from analysis.figures.diagnosis.remainder import remainder_picture
 from analysis.figures.diagnosis.rivals import rivals_pictures
 from analysis.figures.diagnosis.signature import signature_pictures
@@ -32,7 +32,7 @@ def diagnosis_drawings(found: Findings) -> list[Part]:
         return [mismatch_map_picture(found.maps, number, unit)]
 
     drawn: list[tuple[str, Callable[[], Sequence[Picture]]]] = [
-        *(("the mismatch map", partial(mapped, number)) for number in range(len(driving_inputs(found.maps)))),
+        *(("the mismatch map", partial(mapped, number)) for number in range(len(rank_driving_inputs(found.maps)))),
         ("the map of states", lambda: state_map_pictures(found.state_maps)),
         ("the figure of signatures", lambda: signature_pictures(found.signatures)),
         ("the figure of rivals", lambda: rivals_pictures(found.explanation, found.axes or ("x", "y", "z"))),

@@ -51,16 +51,16 @@ class _Layout:
         return np.array([column * (len(self.bands) + _GAP), row * (len(self.channels) + _GAP)])
 
 
-def driving_inputs(maps: Maps) -> tuple[str, ...]:
+def rank_driving_inputs(maps: Maps) -> tuple[str, ...]:
     """The one with most mismatch first."""
     inputs = {cell.input for cells in maps.values() for cell in cells}
     return tuple(sorted(inputs, key=lambda each: (-_worst_mismatch(maps, each), each)))
 
 
 def mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
-    """Mismatch map of one driving input. number: of the driving input in `driving_inputs`; all but the first are
+    """Mismatch map of one driving input. number: of the driving input in `rank_driving_inputs`; all but the first are
     folded. unit: of the command."""
-    input_ = driving_inputs(maps)[number]
+    input_ = rank_driving_inputs(maps)[number]
     return Picture(
         name=f"mismatch-map-{number + 1}",
         title=f"Where model and device disagree, driven by {input_}",
@@ -91,15 +91,15 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
         axes.add_collection(PolyCollection(corners, facecolors=face, edgecolors=edge, linewidths=0.5, zorder=order))
     height, width = table.shape
     extent = (-0.5, width / _FINE - 0.5, height / _FINE - 0.5, -0.5)
-    loudest = _colour_limit(table)
-    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, loudest), aspect="auto",
+    largest = _colour_limit(table)
+    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, largest), aspect="auto",
                         interpolation="nearest", extent=extent)  # fmt: skip
     axes.add_collection(LineCollection(frames, colors=BLACK, linewidths=0.9, zorder=3), autolim=False)
     if len(layout.bands) <= _NUMBERS_FIT:
         _write_numbers(axes, table, panels, layout)
     _label_axes(axes, layout, unit)
     bar = figure.colorbar(image, cax=beside)
-    ratio_ticks(bar.ax.yaxis, 1.0, loudest)
+    ratio_ticks(bar.ax.yaxis, 1.0, largest)
     bar.set_label("residual / noise", fontsize=9)
     beside.tick_params(labelsize=8)
     return figure

@@ -49,8 +49,8 @@ def draw_signature(signature: Signature) -> Figure:
         return draw_no_data_note(figure, "Too few samples show this effect to draw it.")
     axes = figure.add_subplot()
     plain_axes(axes)
-    along, x_factor = _scaled_label(signature.along, signature.measured_at)
-    of, y_factor = _scaled_label(signature.of, np.concatenate([signature.measured, signature.law]))
+    along, x_factor = _scale_label(signature.along, signature.measured_at)
+    of, y_factor = _scale_label(signature.of, np.concatenate([signature.measured, signature.law]))
     spectrum = signature.along.startswith("frequency")
     axes.errorbar(
         x_factor * signature.measured_at, y_factor * signature.measured, yerr=2 * y_factor * signature.spread,
@@ -69,7 +69,7 @@ def draw_signature(signature: Signature) -> Figure:
     else:
         axes.axhline(0, color=GREY, linewidth=0.8, zorder=1)
         if signature.visited is not None:
-            axes.set_ylim(_visited_limits(signature, y_factor))
+            axes.set_ylim(_find_visited_limits(signature, y_factor))
         for begins, ends in _never_visited(signature):
             axes.axvspan(x_factor * begins, x_factor * ends, color=GREY, alpha=0.15, linewidth=0, zorder=0)
         if signature.measured_at.min() < 0 < signature.measured_at.max():
@@ -80,7 +80,7 @@ def draw_signature(signature: Signature) -> Figure:
     return figure
 
 
-def _scaled_label(text: str, values: FloatArray) -> tuple[str, float]:
+def _scale_label(text: str, values: FloatArray) -> tuple[str, float]:
     """ "velocity of x (m/s)" as "Velocity of x (mm/s)", with the factor that goes with it."""
     words, bracket, rest = text.rpartition(" (")
     if not bracket or "/√" in rest or rest.startswith("Hz"):
@@ -89,7 +89,7 @@ def _scaled_label(text: str, values: FloatArray) -> tuple[str, float]:
     return f"{capitalise(words)} ({scale.unit})", scale.factor
 
 
-def _visited_limits(signature: Signature, factor: float) -> tuple[float, float]:
+def _find_visited_limits(signature: Signature, factor: float) -> tuple[float, float]:
     """Ordinates of what was visited, with as much again as margin: a formula may have a pole beyond."""
     assert signature.visited is not None
     low, high = signature.visited

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.psychophysics.catch_trials import wilson_interval
-from analysis.wording import conjoin, number, signed_number
+from analysis.wording import conjoin, format_signed, number
 
 CASES_HZ = {25.0: "0.85 N", 35.0: "3 N, the cap", 45.0: "4 N, above the cap"}
 """Frequencies of the simulated studies that are reported, and the median threshold there; at 5 Hz it is 0.35 N."""
@@ -48,7 +48,7 @@ def coverage_lines(rows: Sequence[MeasuredCoverage]) -> list[str]:
     for name, title in NAMES.items():
         for row in rows:
             if row.analysis == name:
-                bias = "" if row.bias_db is None else signed_number(row.bias_db)
+                bias = "" if row.bias_db is None else format_signed(row.bias_db)
                 lines.append(f"| {title} | {CASES_HZ.get(row.frequency_hz, '')} | {bias} | {row.percent} |")
     return lines
 
@@ -59,7 +59,7 @@ def coverage_sentence(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
     for row in rows:
         if row.analysis == analysis and row.frequency_hz:
             known = row.bias_db is not None and analysis not in ONLY_BELOW
-            bias = f" (off by {signed_number(row.bias_db or 0.0, 1)} dB)" if known else ""
+            bias = f" (off by {format_signed(row.bias_db or 0.0, 1)} dB)" if known else ""
             texts.append(f"{number(100 * row.covered / row.intervals, 0)} % at {CASES_HZ[row.frequency_hz]}{bias}")
         elif row.analysis == analysis:
             return f"{_SIMULATED}, {NAMES[analysis]} {row.percent}, where it says 5 %."

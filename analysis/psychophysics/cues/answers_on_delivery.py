@@ -54,7 +54,7 @@ class AnswersOnDelivery:
     p: float | None
 
     @property
-    def tells(self) -> bool:
+    def is_conclusive(self) -> bool:
         """Whether a participant who relied on the cue would have shown: the interval is narrower than that slope."""
         return self.lower is not None and self.upper is not None and self.upper - self.lower < RELYING
 
@@ -106,10 +106,10 @@ def _residuals(trials: DeliveredTrials, values_db: FloatArray) -> tuple[FloatArr
     """(n,), and where they are known: not for a trial without the value, nor a participant with too few of them."""
     residual, known = np.zeros(len(values_db)), np.zeros(len(values_db), dtype=np.bool_)
     for number in range(len(trials.subjects)):
-        mine = (trials.person == number) & np.isfinite(values_db)
-        fit = same_level_difference(values_db[mine], trials.nominal_db[mine], trials.side[mine])
+        of_person = (trials.person == number) & np.isfinite(values_db)
+        fit = same_level_difference(values_db[of_person], trials.nominal_db[of_person], trials.side[of_person])
         if fit is not None:
-            residual[mine], known[mine] = fit.residual_db, True
+            residual[of_person], known[of_person] = fit.residual_db, True
     return residual, known
 
 

@@ -65,8 +65,8 @@ def cue_abilities(trials: DeliveredTrials) -> tuple[CueAbility, ...]:
     found = []
     for cue, values_db in trials.values_db.items():
         for number, subject in enumerate(trials.subjects):
-            mine = (trials.person == number) & np.isfinite(values_db)
-            fit = same_level_difference(values_db[mine], trials.nominal_db[mine], trials.side[mine])
+            of_person = (trials.person == number) & np.isfinite(values_db)
+            fit = same_level_difference(values_db[of_person], trials.nominal_db[of_person], trials.side[of_person])
             if fit is None:
                 continue
             half = float(student.ppf(0.5 + CONFIDENCE / 2, fit.df)) * fit.error_db

@@ -12,9 +12,9 @@ from analysis.psychophysics.cues.cue_ability import (
     CueAbility,
     cue_abilities,
 )
-from analysis.psychophysics.cues.delivered_cues import Cue, CueGap, DeliveredTrials, delivered_trials
+from analysis.psychophysics.cues.delivered_cues import Cue, CueGap, DeliveredTrials, select_delivered_trials
 from analysis.psychophysics.group_contrasts import holm_correction
-from analysis.wording import conjoin, number, p_text, signed_number
+from analysis.wording import conjoin, format_signed, number, p_text
 from protocols.trial import Trial
 
 LEVEL = 0.05
@@ -54,7 +54,7 @@ def cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
     """Findings by frequency and cue, over the measured test trials; empty without any."""
     parts = [
         (group, cue_abilities(group), regressed)
-        for group in delivered_trials(trials)
+        for group in select_delivered_trials(trials)
         for regressed in answers_on_delivery(group)
     ]
     tested = [regressed.p for _, _, regressed in parts if regressed.p is not None]
@@ -78,14 +78,14 @@ def _finding(
         largest_db=max((each.difference_db for each in people), key=abs),
         spread_db=median([each.spread_db for each in people]),
         abilities=tuple(median([each.ability(noise) for each in people]) for noise in INTERNAL_NOISE_DB),
-        observed_d_prime=_observed_d_prime(group),
+        observed_d_prime=_average_d_prime(group),
         noticed_by=tuple(each.subject for each in people if each.noticeable),
         answers=regressed,
         p_holm=p_holm,
     )
 
 
-def _observed_d_prime(group: DeliveredTrials) -> float | None:
+def _average_d_prime(group: DeliveredTrials) -> float | None:
     """Mean over participants; None where none was shown both directions."""
     found = []
     for place in range(len(group.subjects)):
@@ -100,9 +100,9 @@ def _observed_d_prime(group: DeliveredTrials) -> float | None:
 def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tuple[str, ...]:
     """Warnings for the interpretation of the thresholds; empty where no cue is notable. Of missing measurements only
     those of some trials: that a study measured no harmonics at all is not listed."""
-    noticed = [_noticed_text(each) for each in found if each.noticed_by]
+    noticed = [_describe_noticed(each) for each in found if each.noticed_by]
     followed = [
-        f"{each.cue.value} at {each.frequency_hz:g} Hz ({signed_number(each.answers.slope or 0.0)} logits per dB, "
+        f"{each.cue.value} at {each.frequency_hz:g} Hz ({format_signed(each.answers.slope or 0.0)} logits per dB, "
         f"Holm's {p_text(each.p_holm)})"
         for each in found
         if each.followed
@@ -138,11 +138,11 @@ def gap_text(gaps: Sequence[CueGap]) -> str:
     )
 
 
-def _noticed_text(finding: CueFinding) -> str:
+def _describe_noticed(finding: CueFinding) -> str:
     ability = finding.abilities[INTERNAL_NOISE_DB.index(USUAL_NOISE_DB)]
     right = 100.0 * NormalDist().cdf(ability / 2.0)
     return (
-        f"{finding.cue.value} at {finding.frequency_hz:g} Hz ({signed_number(finding.difference_db, 1)} dB at the "
+        f"{finding.cue.value} at {finding.frequency_hz:g} Hz ({format_signed(finding.difference_db, 1)} dB at the "
         f"median, {len(finding.noticed_by)} of {len(finding.people)} participants; alone d' {number(ability, 1)}, "
         f"{right:.0f} % right; the answers' d' {number(finding.observed_d_prime, 1)})"
     )

@@ -50,7 +50,7 @@ class DeliveredTrials:
 
 @dataclass(frozen=True, slots=True)
 class CueGap:
-    """Trials at one frequency that tell nothing of one cue, among those with a measured amplitude."""
+    """Trials at one frequency without information on one cue, among those with a measured amplitude."""
 
     frequency_hz: float
     cue: Cue
@@ -58,10 +58,10 @@ class CueGap:
     trials: int
 
 
-def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
+def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
     """Cues by rising frequency; only measured trials."""
     chosen = [t for t in trials if t.phase is Phase.TEST and t.counts and t.delivered_mps2 and t.level_n > 0]
-    turned = _turned_sessions(chosen)
+    turned = _find_turned_sessions(chosen)
     found = []
     for frequency_hz in sorted({trial.frequency_hz for trial in chosen}):
         rows = [trial for trial in chosen if trial.frequency_hz == frequency_hz]
@@ -86,7 +86,7 @@ def delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
 def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
     """Missing measurements by frequency and cue; only where something is missing."""
     gaps = []
-    for group in delivered_trials(trials):
+    for group in select_delivered_trials(trials):
         n = len(group.person)
         for cue in Cue:
             values_db = group.values_db.get(cue)
@@ -96,7 +96,7 @@ def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
     return tuple(gaps)
 
 
-def _turned_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
+def _find_turned_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
     """Participant and session where label 1 is the direction at the larger angle. Labels go with the session: a
     participant who comes twice may have them the other way round. A session in which only one of the two was measured
     is compared with the larger angle of all sessions."""

@@ -53,7 +53,7 @@ class Answers:
         shape = self.persons, len(self.frequencies_hz)
         trials = np.bincount(self.run, weights=self.right + self.wrong, minlength=math.prod(shape))
         trials = trials.reshape(shape)
-        # Of a person who lacks a frequency the longest run tells nothing: it may be broken off, too.
+        # Of a person who lacks a frequency the longest run shows nothing: it may be broken off, too.
         own = np.where(trials.min(axis=1) > 0, trials.max(axis=1), math.inf)
         most = np.minimum(trials.max(axis=0), own[:, None])
         enough: NDArray[np.bool_] = trials >= np.clip(0.5 * most, 1.0, FEWEST_ANSWERS)

@@ -7,7 +7,8 @@ shown has the mean q(t) with Phi(q) = 1/2 + F(t)/2 (half of d'). Three shapes of
     logistic                 1 - F = 1 / (1 + exp(t))
     Gauss                    1 - F = Phi(-t)
 
-t = t0 + slope ln(10)/20 (level - threshold), where t0 makes F(t0) the target of the staircase: 79.37 % right.
+t = t0 + slope ln(10)/20 (level - threshold), where t0 makes the share of right answers at the threshold, 1/2 + F(t0)/2,
+that to which the staircase converges: 79.37 %.
 
 Source: F. A. Wichmann, N. J. Hill, Percept. Psychophys. 63 (2001), 1293-1313; N. A. Macmillan, C. D. Creelman,
 Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2.
@@ -72,8 +73,9 @@ def evidence_at(t: FloatArray, family: Family) -> FloatArray:
 
 
 def share_right(evidence: FloatArray, lapse: float) -> FloatArray:
-    """P(right) in the shape of evidence, the mean q(t) - side * criterion in units of d'; half of all lapses are right
-    by chance."""
+    """P(right) in the shape of evidence, the mean q(t) - side * criterion in units of d'; lapse: lapse rate, the
+    probability of a wrong answer at any level however high: half of all inattentive answers, as the other half are
+    right by chance."""
     share: FloatArray = lapse + (1.0 - 2.0 * lapse) * ndtr(evidence)
     return share
 

@@ -46,7 +46,8 @@ class HierarchicalFit:
 
     @property
     def lapse(self) -> float:
-        """Lapse rate common to all persons, 0 to 1."""
+        """Lapse rate common to all persons: probability of a wrong answer at the highest levels (see
+        `curve.share_right`)."""
         return float(expit(self.parameters[self.layout.lapse]))
 
 

@@ -34,7 +34,7 @@ class GoodnessOfFit:
 
 def goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
     """Shares in at most `BINS` bins of about equally many trials, in ascending order of the predicted share."""
-    share, cells = predicted_shares(fit), fit.answers
+    share, cells = predict_shares(fit), fit.answers
     trials = cells.right + cells.wrong
     order = np.argsort(share, kind="stable")
     place = np.minimum((np.cumsum(trials[order]) - 0.5) / trials.sum() * BINS, BINS - 1).astype(int)
@@ -55,7 +55,7 @@ def goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
     return GoodnessOfFit(tuple(bins))
 
 
-def predicted_shares(fit: HierarchicalFit) -> FloatArray:
+def predict_shares(fit: HierarchicalFit) -> FloatArray:
     """Probability of a right answer in each cell (m,), with the person's own threshold, slope and criterion."""
     cells, k = fit.answers, fit.layout.k
     person = cells.person

@@ -88,7 +88,7 @@ def median_thresholds(
     fit: HierarchicalFit, cap_db: float, confidence: float, prior: Prior | None = None
 ) -> tuple[MedianThreshold, ...]:
     """Two-sided intervals below the cap, one-sided profile bounds above it, each the lower end that a two-sided
-    interval of the confidence has: the data choose which of them is told (see `lower_bound`). With two people at a
+    interval of the confidence has: the data choose which of them is reported (see `lower_bound`). With two people at a
     frequency there is no interval: a t distribution with one degree of freedom holds nearly every threshold."""
     errors = mean_errors(pseudo_thresholds(fit), fit.answers.played)
     half = student.ppf(0.5 + confidence / 2, errors.df) * errors.error
@@ -109,8 +109,8 @@ def lower_bound(
 ) -> float | None:
     """One-sided bound of a mean by profile likelihood, with the t distribution's quantile in place of the normal's.
 
-    A bound that is only told where the estimate is above the cap is wrong more often than its confidence says, where
-    the true median is near the cap: then each of the two ends may be wrong by half of what is left, and no more.
+    A bound that is only reported where the estimate is above the cap is wrong more often than its confidence says,
+    where the true median is near the cap: then each of the two ends may be wrong by half of what is left, and no more.
     Source: G. J. Feldman, R. D. Cousins, Phys. Rev. D 57 (1998), 3873-3889.
 
     df: degrees of freedom, None for those of all persons. None where no bound is found within `FAR_DB` below the

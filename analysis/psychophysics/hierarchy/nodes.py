@@ -91,18 +91,20 @@ class Population:
     criterion_sd: float
     """Of the criterion c, in units of d'; its mean is 0."""
     lapse: float
-    """Share of lapses, the same for all people."""
+    """Lapse rate, the same for all people."""
 
     @staticmethod
     def of(parameters: FloatArray, k: int) -> "Population":
-        """From parameters (k + 6,): standard deviations and lapse rate no longer as logarithms and logit."""
+        """The population of transformed parameters (k + 6,), in which standard deviations are logarithms and the lapse
+        rate is a logit (`marginal.Layout`)."""
         shared, own, slope_sd, criterion_sd = (math.exp(parameters[k + place]) for place in (0, 1, 3, 4))
         lapse = float(expit(parameters[k + 5]))
         return Population(parameters[:k], shared, own, float(parameters[k + 2]), slope_sd, criterion_sd, lapse)
 
 
 def laplace_moments(parameters: FloatArray, mode: FloatArray, information: FloatArray) -> Moments:
-    """By Laplace's method. mode: (n, k + 2), information of the answers there: (n, k + 2, k + 2)."""
+    """Posterior moments of each person by Laplace's method. mode: (n, k + 2), information of the answers there: (n, k +
+    2, k + 2)."""
     k = mode.shape[1] - 2
     population, places = Population.of(parameters, k), np.arange(k)
     own, shared = population.own_sd**2, population.shared_sd**2

@@ -42,7 +42,7 @@ class Objective:
     def __init__(self, answers: Answers, family: Family, prior: Prior) -> None:
         self.answers, self.family = answers, family
         self.prior, self.layout = prior, Layout(len(answers.frequencies_hz))
-        begin = starting_parameters(answers, family)
+        begin = find_starting_parameters(answers, family)
         k = self.layout.k
         latent = np.tile(np.concatenate([begin[:k], [begin[self.layout.slope], 0.0]]), (answers.persons, 1))
         self.marginal = Marginal(TrialLikelihood(answers, family), latent)
@@ -86,7 +86,7 @@ class Objective:
         return bounds
 
 
-def starting_parameters(answers: Answers, family: Family) -> FloatArray:
+def find_starting_parameters(answers: Answers, family: Family) -> FloatArray:
     """Starting values of the population parameters: means from the levels played, usual spreads."""
     k = len(answers.frequencies_hz)
     trials = answers.right + answers.wrong

@@ -26,7 +26,7 @@ from protocols.procedure.staircase import to_db
 CONFIDENCE = 0.95
 """Default confidence of all intervals."""
 FAR_ABOVE_DB = 6.0
-"""Of two medians that both lie this far above the cap no difference is told: the right answers are hardly more than
+"""Of two medians that both lie this far above the cap no difference is reported: the right answers are hardly more than
 chance at all levels, the sizes are extrapolated, and their differences have no known error."""
 FAR_ABOVE = "Two medians or more lie at more than twice the cap: nothing is known of their differences."
 
@@ -141,14 +141,14 @@ def _compare(fit: HierarchicalFit, cap_db: float, confidence: float, declared_hz
     far = fit.means_db > cap_db + FAR_ABOVE_DB
     far_hz = tuple(frequency_hz for frequency_hz, is_far in zip(frequencies, far, strict=True) if is_far)
     # The first is the reference: from one far above the cap, another such has no difference.
-    told = ~(far & far[0]) | (np.arange(len(far)) == 0)
+    determined = ~(far & far[0]) | (np.arange(len(far)) == 0)
     declared = None
     if not set(declared_hz) <= set(far_hz):
         declared = pair_contrast(frequencies, pseudo, declared_hz, confidence, played)
     overall, converged = _overall(fit.answers, pseudo, fit.family, far)
     return _Compared(
         overall=overall,
-        contrasts=contrasts(frequencies, pseudo, confidence, played & told),
+        contrasts=contrasts(frequencies, pseudo, confidence, played & determined),
         declared=declared,
         far_above_hz=far_hz,
         converged=converged,
@@ -191,7 +191,7 @@ def answers_of(answers: Answers, chosen: NDArray[np.bool_]) -> Answers:
 
 
 def _nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[Nuisance]:
-    """What all answers of each person tell of the slope and the criterion."""
+    """Slope and criterion of each person from all answers."""
     return [
         Nuisance(person.slope, person.criterion, (fit.lapse,), *map(float, errors))
         for person, errors in zip(persons, fit.shared_errors, strict=True)

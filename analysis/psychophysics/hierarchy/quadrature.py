@@ -56,8 +56,8 @@ class _Person:
         self._runs = run[self._starts]
 
     def log_likelihoods(self, shared: FloatArray, threshold: FloatArray, lapse: float) -> FloatArray:
-        """Of each run, with the first two derivatives by the lapse rate: (3, q, k, r). shared: (q, 3), threshold:
-        (q, k, r)."""
+        """(3, q, k, r): log-likelihood of each run, and its first two derivatives by the lapse rate. shared: (q, 3),
+        threshold: (q, k, r)."""
         pace = np.exp(shared[:, 1, None]) * NEPER_PER_DB
         away = self._level_db[:, None, None] - threshold[:, self._place].swapaxes(0, 1)
         q = evidence_at(AT_THRESHOLD[self._family] + pace * away, self._family)
@@ -78,7 +78,8 @@ class Quadrature:
         self._persons = [_Person(answers, person, family) for person in range(answers.persons)]
 
     def log_likelihoods(self, nodes: Nodes, lapse: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Of each run, with the first two derivatives by the logit of the lapse rate: (n, q, k, r) each."""
+        """Log-likelihood of each run, and its first two derivatives by the logit of the lapse rate, (n, q, k, r)
+        each."""
         parts = zip(self._persons, nodes.shared, nodes.threshold, strict=True)
         each = [person.log_likelihoods(shared, threshold, lapse) for person, shared, threshold in parts]
         value, first, second = np.stack(each, axis=1)

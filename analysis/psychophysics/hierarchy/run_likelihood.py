@@ -1,12 +1,12 @@
 """Maximum-likelihood threshold of each single run, with a likelihood interval.
 
-One run of some 60 trials does not tell a slope: it is averaged over a distribution of slopes, criteria and lapse rates
-(`Nuisance`): of what all answers of the person tell in the model of all answers, or of what is usual. The threshold is
-the run's alone, not drawn towards anything, and so is the interval.
+One run of some 60 trials does not determine a slope: it is averaged over a distribution of slopes, criteria and lapse
+rates (`Nuisance`): as all answers of the person give them in the model of all answers, or of what is usual. The
+threshold is the run's alone, not drawn towards anything, and so is the interval.
 
 A run with only right answers has no most probable threshold: the lower, the more probable. It gets no size and only an
 upper bound, as a run whose most probable threshold is above the cap gets only a lower one. A bound is the end that the
-two-sided interval has: the answers choose which of them is told, and a bound of the confidence itself would then be
+two-sided interval has: the answers choose which of them is reported, and a bound of the confidence itself would then be
 wrong more often than it says (G. J. Feldman, R. D. Cousins, Phys. Rev. D 57 (1998), 3873-3889).
 
 Source: S. S. Wilks, Ann. Math. Stat. 9 (1938), 60-62 (half the chi-squared quantile below the highest log-likelihood).
@@ -34,7 +34,7 @@ SAME_HEIGHT = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Nuisance:
-    """What a run itself does not tell."""
+    """Parameters that a run itself does not determine: distributions of slope, criterion and lapse rate."""
 
     slope: float
     """Median slope, in the units of `curve`."""
@@ -76,7 +76,7 @@ def run_likelihoods(
     confidence: float = 0.95,
 ) -> tuple[RunLikelihood, ...]:
     """Threshold and interval of each person at each frequency, in the order of the runs' numbers. people: what their
-    runs do not tell, in the order of the answers' subjects. cap_db: in dB re 1 N."""
+    runs do not determine, in the order of the answers' subjects. cap_db: in dB re 1 N."""
     k = len(answers.frequencies_hz)
     found = []
     for run in np.unique(answers.run):

@@ -65,7 +65,7 @@ class ComparedPerson(NamedTuple):
     criterion: float
 
 
-def compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
+def list_compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
     """The protocol's up-down rule with each reading of its steps, and Psi with as many trials as such a run takes."""
     names = {
         StepChange.AFTER_REVERSAL: "staircase, new step after the reversal",
@@ -91,7 +91,7 @@ def _result(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int
         trials.append(state.trials)
         highest = max(highest, top_n)
         if is_complete(rule, state):
-            errors.append(estimated_db(rule, state) - true_db)
+            errors.append(estimate_db(rule, state) - true_db)
     found = np.array(errors) if errors else np.array([math.nan])
     error = float(np.sqrt((found**2).mean()))
     return RuleResult(
@@ -107,7 +107,8 @@ def _result(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int
 
 
 def play(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> tuple[float, StaircaseState, float]:
-    """True threshold (dB), the run's last state, and the highest level played (N)."""
+    """Simulate a run of a person drawn from the crowd. key: seeds the draws. Returns the true threshold (dB re 1 N),
+    the last state, and the highest level played (N)."""
     random = np.random.default_rng(key)
     spread = crowd.frequency_sd_db if isinstance(crowd.frequency_sd_db, float) else crowd.frequency_sd_db[0]
     true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, spread) * random.standard_normal()
@@ -143,7 +144,7 @@ def _is_right(crowd: Crowd, steps: float, criterion: float, draw: FloatArray) ->
     return bool(draw[1] < right)
 
 
-def estimated_db(rule: StaircaseRule, state: StaircaseState) -> float:
+def estimate_db(rule: StaircaseRule, state: StaircaseState) -> float:
     """Threshold of a complete run, in dB re 1 N, estimated as in the analysis of a session."""
     if rule.is_bayesian:
         cap_db = to_db(rule.cap_n)

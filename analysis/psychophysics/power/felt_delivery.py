@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials, delivered_trials
+from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials, select_delivered_trials
 from equalizer.signals.signal import FloatArray
 from protocols.trial import Trial
 
@@ -40,7 +40,7 @@ def felt_delivery(
     """Medians over the measured test trials, by played levels rounded to 1 dB. flawless_mps2_per_n: along the
     direction, at each frequency. What no trial of a level was measured for counts as absent. Raises ValueError where a
     frequency lacks a measured direction."""
-    groups = {group.frequency_hz: group for group in delivered_trials(trials)}
+    groups = {group.frequency_hz: group for group in select_delivered_trials(trials)}
     if missing := [f"{f:g} Hz" for f in frequencies_hz if f not in groups or len(set(groups[f].side.tolist())) < 2]:
         raise ValueError(f"no measured trials of both directions at {', '.join(missing)}")
     return FeltDelivery(
@@ -59,8 +59,8 @@ def _table(group: DeliveredTrials, side: float, flawless: float) -> Table:
     rounded = np.round(group.played_db)
     rows: list[Row] = []
     for level_db in np.unique(rounded[group.side == side]):
-        mine = (group.side == side) & (rounded == level_db)
-        along, across, harmonics = (_median(column[mine]) for column in columns)
+        of_level = (group.side == side) & (rounded == level_db)
+        along, across, harmonics = (_median(column[of_level]) for column in columns)
         if along is not None:
             rows.append((float(level_db), along, across or 0.0, harmonics or 0.0))
     return tuple(rows)

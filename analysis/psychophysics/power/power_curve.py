@@ -46,7 +46,7 @@ class Share:
     value: float
     lower: float
     upper: float
-    """Wilson's 95 % interval: how well the simulated studies tell the share."""
+    """Wilson's 95 % interval: how well the simulated studies determine the share."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +71,9 @@ def judge_study(
     crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[int, ...], contrast_hz: tuple[float, ...] = ()
 ) -> StudyVerdict:
     """Two people at least; thresholds of all people must be complete, so the rule must have no trial limit.
-    contrast_hz: as of `judged_pair`."""
+    contrast_hz: as of `find_judged_pair`."""
     study = simulate_study(crowd, rule, people, seed)
-    pair_hz = judged_pair(crowd.frequencies_hz, contrast_hz)
+    pair_hz = find_judged_pair(crowd.frequencies_hz, contrast_hz)
     first, second = (crowd.frequencies_hz.index(frequency_hz) for frequency_hz in pair_hz)
     true_db = true_difference_db(crowd, contrast_hz)
     pseudo = pseudo_thresholds(fit_hierarchy(study.answers))
@@ -98,16 +98,16 @@ def judge_study(
     )
 
 
-def judged_pair(frequencies_hz: tuple[float, ...], contrast_hz: tuple[float, ...]) -> tuple[float, float]:
+def find_judged_pair(frequencies_hz: tuple[float, ...], contrast_hz: tuple[float, ...]) -> tuple[float, float]:
     """First minus second: the declared contrast, or without one the highest frequency minus the lowest.
     frequencies_hz: in ascending order."""
     return (contrast_hz[0], contrast_hz[1]) if contrast_hz else (frequencies_hz[-1], frequencies_hz[0])
 
 
 def true_difference_db(crowd: Crowd, contrast_hz: tuple[float, ...] = ()) -> float:
-    """Median threshold at the first frequency of `judged_pair` over that at the second."""
+    """Median threshold at the first frequency of `find_judged_pair` over that at the second."""
     medians_n = dict(zip(crowd.frequencies_hz, crowd.medians_n, strict=True))
-    first_hz, second_hz = judged_pair(crowd.frequencies_hz, contrast_hz)
+    first_hz, second_hz = find_judged_pair(crowd.frequencies_hz, contrast_hz)
     return 20.0 * float(np.log10(medians_n[first_hz] / medians_n[second_hz]))
 
 

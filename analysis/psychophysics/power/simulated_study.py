@@ -90,7 +90,7 @@ class SimulatedStudy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _RunThresholds:
-    """Of all runs (runs,)."""
+    """Thresholds of all simulated runs, (runs,) each."""
 
     newton: FloatArray
     db: FloatArray
@@ -127,7 +127,8 @@ def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[i
 
 
 def _draw_people(crowd: Crowd, people: int, rng: np.random.Generator) -> tuple[FloatArray, list[Participant]]:
-    """True thresholds (people, frequencies) in dB, and a participant for each run, person by person."""
+    """Draw people from the crowd. Returns true thresholds (people, frequencies) in dB re 1 N, and a participant for
+    each run, person by person."""
     k = len(crowd.frequencies_hz)
     own = np.broadcast_to(np.asarray(crowd.frequency_sd_db, dtype=np.float64), (k,))
     true_db = 20.0 * np.log10(np.asarray(crowd.medians_n)) + crowd.person_sd_db * rng.standard_normal((people, 1))
@@ -154,7 +155,7 @@ def _reversal_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFound
 
 
 def _posterior_means(rule: StaircaseRule, tracks: Track, found: Sequence[RunFound]) -> _RunThresholds:
-    """As `thresholds.threshold_of` has them."""
+    """Posterior means of Psi, with the cap as in `thresholds.threshold_of`."""
     db = np.minimum([run.mean_db for run in found], to_db(rule.cap_n))
     cut = np.array([run.above_cap for run in found]) > MAYBE_ABOVE
     return _RunThresholds(np.minimum(10.0 ** (db / 20.0), rule.cap_n), db, cut.astype(np.float64))

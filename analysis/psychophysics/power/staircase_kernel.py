@@ -158,19 +158,20 @@ def look_again(middle: float, lapse: float, unsure: float, left: int) -> tuple[b
 
 
 class RunFound(NamedTuple):
-    """What a run came to."""
+    """Result of a simulated run."""
 
     trials: int
     reversals: int
     mean_db: float = math.nan
-    """Of the threshold's posterior, for a run by Psi, as the next."""
+    """Mean of the threshold's posterior (dB re 1 N), for a run by Psi only, as the next."""
     above_cap: float = math.nan
     """Probability that the threshold lies above the cap."""
 
 
 @njit(cache=True)
 def give_answer(person: Participant, level_db: float, trial: int, left: int) -> tuple[float, bool, int]:
-    """What is shown (1 or -1) at the trial of the run, whether the answer is right, and how many repeats are left."""
+    """Simulate the answer at a trial. Returns the direction shown (1 or -1), whether the answer is right, and the
+    number of repeats that are left."""
     s = 1.0 if np.random.random() < 0.5 else -1.0
     felt = felt_db(person, level_db, s > 0.0, trial)
     a = evidence(person.t0 + person.pace_per_db * (felt - person.threshold_db), person.family) - s * (
@@ -193,7 +194,7 @@ def play_around(level_db: float, rove_db: float) -> float:
 def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> RunFound:
     """Plays until the run ends, and fills the track."""
     np.random.seed(seed)
-    level, heading, good, bad, trials, reversals = rule.start_db, 0, 0, 0, 0, 0
+    level, heading, right_in_row, wrong_in_row, trials, reversals = rule.start_db, 0, 0, 0, 0, 0
     left = person.repeats
     limit = min(rule.trial_limit, MOST_TRIALS) if rule.trial_limit > 0 else MOST_TRIALS
     while reversals < rule.reversals and trials < limit:
@@ -201,15 +202,15 @@ def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> 
         s, answer, left = give_answer(person, played, trials, left)
         track.level_db[trials], track.side[trials], track.right[trials] = played, s, answer
         trials += 1
-        good, bad = (good + 1, 0) if answer else (0, bad + 1)
+        right_in_row, wrong_in_row = (right_in_row + 1, 0) if answer else (0, wrong_in_row + 1)
         early = rule.initial and reversals == 0
-        if bad >= (1 if early else rule.up_after_wrong):
+        if wrong_in_row >= (1 if early else rule.up_after_wrong):
             turn = 1
-        elif good >= (1 if early else rule.down_after_right):
+        elif right_in_row >= (1 if early else rule.down_after_right):
             turn = -1
         else:
             continue
-        good = bad = 0
+        right_in_row = wrong_in_row = 0
         if turn == 1 and level >= rule.cap_db - SAME_DB:
             continue
         turned = heading != 0 and turn != heading

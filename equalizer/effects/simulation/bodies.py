@@ -10,7 +10,7 @@ import numpy.typing as npt
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
 from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.mechanism_kernel import LAWS, law_address, no_force
-from equalizer.effects.simulation.stepping import Forces, Stepping, forced_stepping, unforced_stepping
+from equalizer.effects.simulation.stepping import Forces, Stepping, step_with_forces, step_without_forces
 from equalizer.plant.linear_simulation import LinearSteps, driven_axes, linear_steps
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -139,9 +139,9 @@ def _prepare_steps(
     ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.sees else 0)}))
     steps, stride = size[1], len(driven.mean) // size[0]
     if not ports:
-        return linear, unforced_stepping(linear, steps, stride), ports
+        return linear, step_without_forces(linear, steps, stride), ports
     commanded = driven.mean if driven.commanded is None else driven.commanded
-    return linear, forced_stepping(linear, kernel_forces(bodies, ports), steps, stride, commanded), ports
+    return linear, step_with_forces(linear, kernel_forces(bodies, ports), steps, stride, commanded), ports
 
 
 def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:

@@ -13,11 +13,11 @@ BETA = 8.0
 """Shape parameter of the Kaiser window: ripple of 1e-4 up to 0.42 of the sample rate."""
 
 
-def read_other_times(response: FloatArray, per_sample: float, offset: float, straight: float = 0.0) -> FloatArray:
-    """(n, p) from (n, p): sample k is read at k per_sample + offset, in samples. straight: share (0 to 1) of linear
-    interpolation, the rest is band-limited."""
+def read_other_times(response: FloatArray, per_sample: float, offset: float, linear_share: float = 0.0) -> FloatArray:
+    """(n, p) from (n, p): sample k is read at k per_sample + offset, in samples. linear_share: share (0 to
+    1) of linear interpolation, the rest is band-limited."""
     read = np.empty(response.shape)
-    read_at(np.ascontiguousarray(response, dtype=np.float64), per_sample, offset, _sinc_weights(), straight, read)
+    read_at(np.ascontiguousarray(response, dtype=np.float64), per_sample, offset, _sinc_weights(), linear_share, read)
     return read
 
 

@@ -1,4 +1,14 @@
-"""Reading of a sampled response with a wrong clock or with lost samples, compiled."""
+"""Sampling faults of a logger, compiled: a wrong clock, and lost samples that repeat the one before.
+
+A wrong clock: sample k is the response at time t = k per_sample + offset (in samples), interpolated by a tabulated
+windowed sinc (see `interpolated_response`) or linearly. Lost samples: in a simulation they are given; where a
+measurement exists, each is decided by a likelihood ratio: with white noise of standard deviation s per channel, sample
+k is taken as lost where
+
+    sum over channels of ((y - x_k)² - (y - x_before)²) / s²  >  2 ln(odds against a loss),
+
+y the measurement, x_k the simulated sample, x_before the last one that was not lost.
+"""
 
 import numpy as np
 import numpy.typing as npt
@@ -16,23 +26,32 @@ Flags = npt.NDArray[np.bool_]
 
 @njit(types.void(_IN, types.float64, types.float64, _IN, types.float64, _MATRIX), cache=True, nogil=True)
 def read_at(
-    samples: FloatArray, per_sample: float, offset: float, between: FloatArray, straight: float, out: FloatArray
+    samples: FloatArray,
+    per_sample: float,
+    offset: float,
+    filter_table: FloatArray,
+    linear_share: float,
+    out: FloatArray,
 ) -> None:
-    """out[k] = samples at k per_sample + offset; held beyond both ends. samples, out: (n, p). between: (phases + 1,
-    taps), interpolation weights. straight: share of linear interpolation."""
+    """out[k] = samples at the time k per_sample + offset, in samples; the first and the last are held beyond the ends.
+
+    samples, out: (n, p). filter_table: (phases + 1, taps), weights of the interpolation filter at fractions 0 to 1 of a
+    sample, themselves interpolated linearly. linear_share: share, 0 to 1, of linear interpolation."""
     n, p = samples.shape
-    phases, taps = between.shape[0] - 1, between.shape[1]
+    phases, taps = filter_table.shape[0] - 1, filter_table.shape[1]
     weights = np.empty(taps)
     for k in range(n):
         at = min(max(k * per_sample + offset, 0.0), n - 1.0)
         whole = min(int(at), n - 2)
-        part = at - whole
-        row = min(int(part * phases), phases - 1)
-        along = part * phases - row
+        fraction = at - whole
+        row = min(int(fraction * phases), phases - 1)
+        beyond_row = fraction * phases - row
         for tap in range(taps):
-            weights[tap] = (1 - straight) * ((1 - along) * between[row, tap] + along * between[row + 1, tap])
-        weights[taps // 2 - 1] += straight * (1 - part)
-        weights[taps // 2] += straight * part
+            weights[tap] = (1 - linear_share) * (
+                (1 - beyond_row) * filter_table[row, tap] + beyond_row * filter_table[row + 1, tap]
+            )
+        weights[taps // 2 - 1] += linear_share * (1 - fraction)
+        weights[taps // 2] += linear_share * fraction
         first = whole - taps // 2 + 1
         for c in range(p):
             total = 0.0
@@ -43,7 +62,8 @@ def read_at(
 
 @njit(types.void(_IN, _FLAGS, _MATRIX), cache=True, nogil=True)
 def repeat_where(samples: FloatArray, lost: Flags, out: FloatArray) -> None:
-    """Replace each lost sample by the one that was read before it. samples, out: (n, p), lost: (n,)"""
+    """Replace each lost sample by the last one that was not lost. samples, out: (n, p); lost: (n,). The first sample is
+    never lost."""
     out[0] = samples[0]
     for k in range(1, samples.shape[0]):
         out[k] = out[k - 1] if lost[k] else samples[k]
@@ -51,10 +71,13 @@ def repeat_where(samples: FloatArray, lost: Flags, out: FloatArray) -> None:
 
 @njit(types.void(_IN, _IN, _VECTOR_IN, types.float64, _MATRIX, _FLAGS), cache=True, nogil=True)
 def repeat_as_measured(
-    samples: FloatArray, measured: FloatArray, noise: FloatArray, odds_against: float, out: FloatArray, lost: Flags
+    samples: FloatArray, measured: FloatArray, noise: FloatArray, log_odds_against: float, out: FloatArray, lost: Flags
 ) -> None:
-    """Fill out (n, p) and lost (n,): a sample counts as lost where the measurement makes that likelier.
-    odds_against: 2 ln of the odds that a sample is not lost."""
+    """Fill out (n, p) and lost (n,): a sample counts as lost where the measurement makes that likelier (see the
+    module).
+
+    samples, measured: (n, p), simulated and measured. noise: (p,), standard deviation in the channels' units.
+    log_odds_against: 2 ln of the odds that a sample is not lost."""
     n, p = samples.shape
     out[0] = samples[0]
     for k in range(1, n):
@@ -62,5 +85,5 @@ def repeat_as_measured(
         for c in range(p):
             fresh, old = measured[k, c] - samples[k, c], measured[k, c] - out[k - 1, c]
             better += (fresh * fresh - old * old) / (noise[c] * noise[c])
-        lost[k] = better > odds_against
+        lost[k] = better > log_odds_against
         out[k] = out[k - 1] if lost[k] else samples[k]

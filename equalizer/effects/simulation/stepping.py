@@ -65,7 +65,7 @@ class Stepping:
     """Continues from the given state (2n,) at the next block."""
 
 
-def unforced_stepping(linear: LinearSteps, steps: int, stride: int) -> Stepping:
+def step_without_forces(linear: LinearSteps, steps: int, stride: int) -> Stepping:
     """Stepping without motion-dependent forces, a whole sample at once. stride: commands per sample; 1 where they are
     held over all `steps`."""
     pushes = [linear.by_command]
@@ -84,7 +84,7 @@ def unforced_stepping(linear: LinearSteps, steps: int, stride: int) -> Stepping:
     return Stepping(1, (form.inward @ by_command).T, form.outward, BLOCK, run, begin)
 
 
-def forced_stepping(linear: LinearSteps, forces: Forces, steps: int, stride: int, commanded: FloatArray) -> Stepping:
+def step_with_forces(linear: LinearSteps, forces: Forces, steps: int, stride: int, commanded: FloatArray) -> Stepping:
     """Stepping under motion-dependent forces. commanded: (n stride, m), for laws that see the commands."""
     form = step_form(linear.advance)
     where, r = np.array(forces.ports), linear.by_axis_force.shape[1]

@@ -49,7 +49,7 @@ class MissingMass:
     """(lines, m): cross-spectra of the acceleration with the missing force at each axis."""
 
 
-def missing_mass(evidence: Evidence, axis: int) -> MissingMass:
+def estimate_missing_mass(evidence: Evidence, axis: int) -> MissingMass:
     """Welch spectra of an axis's acceleration and of the missing force at all axes, at the lines below 0.45 of the
     sample rate where the acceleration has more than DRIVEN of its largest power."""
     rate, used = evidence.sample_rate_hz, evidence.used[:, None]

@@ -51,7 +51,7 @@ def axis_motion(evidence: Evidence, axis: int) -> AxisMotion:
     return every.where(evidence.used > 0)
 
 
-def sliding_motion(evidence: Evidence, axis: int) -> AxisMotion:
+def select_sliding_motion(evidence: Evidence, axis: int) -> AxisMotion:
     """Motion of an axis, only where its sliding direction is certain."""
     motion = axis_motion(evidence, axis)
     return motion.where(np.abs(motion.velocity) > SLOW * np.sqrt(np.mean(motion.velocity**2)))

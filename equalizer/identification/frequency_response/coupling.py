@@ -6,9 +6,11 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 def worst_coupling(response: ComplexArray) -> FloatArray:
-    """Off-axis over on-axis response when one axis is driven, for the worst axis.
+    """Off-axis over on-axis response when one axis i is driven, for the worst axis:
 
-    response: (..., axes, axes), inputs and outputs in the same frame. Returns (...). Raises ValueError if not square.
+        max over i of sqrt(sum over j != i of |H_ji|²) / |H_ii|
+
+    response: H (..., outputs, inputs), both in the same frame. Returns (...). Raises ValueError if not square.
     """
     require_equal_axes(response)
     power = np.abs(response) ** 2

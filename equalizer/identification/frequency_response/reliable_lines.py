@@ -40,31 +40,33 @@ class Judgement:
 def judge_lines(
     frequency_hz: FloatArray, excited: BoolArray, coherence: FloatArray, spring_hz: float, rules: ReliabilityRules
 ) -> Judgement:
-    """Judge each line. excited: (lines,), by `excited_lines`. coherence: (lines, outputs). spring_hz: 0 = no spring."""
+    """Judge each line. excited: (lines,), by `find_excited_lines`. coherence: (lines, outputs). spring_hz: 0 = no
+    spring."""
     remarks = []
-    stiff = frequency_hz < rules.spring_margin * spring_hz
-    if stiff.any():
+    by_spring = frequency_hz < rules.spring_margin * spring_hz
+    if by_spring.any():
         remarks.append(
             f"Below {rules.spring_margin * spring_hz:.2f} Hz lines are not reliable: the virtual spring "
             f"({spring_hz:g} Hz) takes most of the excitation away there."
         )
-    unexcited = ~excited & ~stiff
+    unexcited = ~excited & ~by_spring
     if unexcited.any():
         remarks.append(f"Not reliable for want of excitation in every direction: {_spans(frequency_hz, unexcited)}.")
     worst = np.min(np.where(np.isnan(coherence), 1.0, coherence), axis=1, initial=1.0)
-    noisy = (worst < rules.least_coherence) & excited & ~stiff
+    noisy = (worst < rules.least_coherence) & excited & ~by_spring
     if noisy.any():
         remarks.append(
             f"Not reliable, because noise is more than {100 * (1 - rules.least_coherence):g} % of an output's power: "
             f"{_spans(frequency_hz, noisy)}."
         )
-    return Judgement(~(stiff | unexcited | noisy), tuple(remarks))
+    return Judgement(~(by_spring | unexcited | noisy), tuple(remarks))
 
 
-def excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_energy_db: float) -> BoolArray:
+def find_excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_energy_db: float) -> BoolArray:
     """Lines at which the excitations span as many directions as there are inputs.
 
-    excitation: (lines, inputs, experiments). Returns (lines,).
+    excitation: spectra (lines, inputs, experiments). Returns a mask (lines,): where the smallest singular value of the
+    strong excitations, each of unit length, exceeds `_LEAST_INDEPENDENCE`.
     """
     least = 10 ** (least_energy_db / 10)
     power = np.sum(np.abs(excitation) ** 2, axis=1)
@@ -72,8 +74,8 @@ def excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_ener
     strong = (power >= least * power.max(axis=0)) | (per_octave >= least * per_octave.max(axis=0))
     length = np.sqrt(np.maximum(power, np.finfo(np.float64).tiny))
     directions = np.where(strong[:, None, :], excitation / length[:, None, :], 0.0)
-    weakest: BoolArray = np.linalg.svd(directions, compute_uv=False)[:, -1] > _LEAST_INDEPENDENCE
-    return weakest
+    spans_inputs: BoolArray = np.linalg.svd(directions, compute_uv=False)[:, -1] > _LEAST_INDEPENDENCE
+    return spans_inputs
 
 
 def spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
@@ -88,7 +90,8 @@ def spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
 
 
 def _spans(frequency_hz: FloatArray, chosen: BoolArray) -> str:
-    """ "below 4 Hz and above 38 Hz", or how many lines where they are scattered."""
+    """The chosen lines as text: up to three spans, such as "1 to 4 Hz and from 38 Hz on", else their number and
+    range."""
     spans = runs_of(chosen)
     if len(spans) > 3:
         first, last = frequency_hz[chosen][[0, -1]]

@@ -19,7 +19,7 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.frequency_response.noise_floor import rest_floor
 from equalizer.identification.frequency_response.reliable_lines import (
     ReliabilityRules,
-    excited_lines,
+    find_excited_lines,
     judge_lines,
     spring_frequency_hz,
 )
@@ -119,7 +119,7 @@ def _join_parts(
     order = np.argsort(np.concatenate([part.frequency_hz for part in parts]))
     frequency_hz = np.concatenate([part.frequency_hz for part in parts])[order]
     excited = np.concatenate(
-        [excited_lines(part.frequency_hz, part.excitation, settings.rules.least_energy_db) for part in parts]
+        [find_excited_lines(part.frequency_hz, part.excitation, settings.rules.least_energy_db) for part in parts]
     )[order]
     coherence = np.concatenate([part.coherence for part in parts])[order]
     spring_hz = spring_frequency_hz([recording.meta for recording in recordings])

@@ -117,7 +117,7 @@ def fit_mechanical_model(
             "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
             "record a sweep, noise or a multisine along every axis"
         )
-    band = _covered_band(segments)
+    band = _find_covered_band(segments)
     groups = line_groups(segments, settings.floor)
     structure = _rigid_structure(recordings[0], settings, band)
     fewer = [group.thin_out(min(LINES_TO_CHOOSE_BY, -(-IN_ALL // len(groups)))) for group in groups]
@@ -203,7 +203,7 @@ def _rigid_structure(recording: Recording, settings: MechanicalFitSettings, band
     )
 
 
-def _covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
+def _find_covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
     return (
         float(min(segment.frequency_hz[0] for segment in segments)),
         float(max(segment.frequency_hz[-1] for segment in segments)),

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines
-from equalizer.identification.mechanical.mechanical_response import free_response, sampled_response
+from equalizer.identification.mechanical.mechanical_response import free_response, sample_response
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
@@ -39,7 +39,7 @@ def simulation_errors(
 
 def simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> ComplexArray:
     """(lines, p): measured minus simulated spectrum, with the initial state that fits best."""
-    response = sampled_response(model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold)
+    response = sample_response(model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold)
     misfit = segment_lines.response - np.einsum("lpm,lm->lp", response, segment_lines.command)
     if not segment_lines.transient:
         return np.asarray(misfit)

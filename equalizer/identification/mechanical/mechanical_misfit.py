@@ -8,7 +8,7 @@ import numpy as np
 from equalizer.identification.frequency_response.frequency_response import BoolArray
 from equalizer.identification.frequency_response.noise_floor import smooth_over_lines
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines, have_same_lines
-from equalizer.identification.mechanical.mechanical_response import PoleForm, free_response, pole_form, sampled_response
+from equalizer.identification.mechanical.mechanical_response import PoleForm, free_response, pole_form, sample_response
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import ComplexArray, FloatArray
@@ -134,7 +134,7 @@ def misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[Complex
     """Residuals per group (lines, p, rows), with transients fitted to the lines that are not left out."""
     form, found = pole_form(model), []
     for group in groups:
-        response = sampled_response(model, group.frequency_hz, group.rate_hz, group.hold, form)
+        response = sample_response(model, group.frequency_hz, group.rate_hz, group.hold, form)
         misfit = group.target - (group.root @ response[..., None])[..., 0]
         found.append(
             _subtract_transient(group, transient_basis(group, model, form), misfit) if group.transient else misfit

@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup, misfits, numerical_jacobian, stack_real
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit
-from equalizer.identification.mechanical.mechanical_response import sampled_response, sensor_response
+from equalizer.identification.mechanical.mechanical_response import sample_response, sensor_response
 from equalizer.identification.mechanical.mechanical_start import solve_scaled, symmetric_matrix, triangle_pairs
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
@@ -98,7 +98,7 @@ def _model_motion(group: LineGroup, model: MechanicalModel, structure: Structure
     order = DERIVATIVE_OF_QUANTITY[structure.quantity]
     s = np.asarray(2j * np.pi * group.frequency_hz, dtype=np.complex128)
     z = np.exp(s / group.rate_hz)
-    response = sampled_response(model, group.frequency_hz, group.rate_hz, group.hold)
+    response = sample_response(model, group.frequency_hz, group.rate_hz, group.hold)
     late = (1.0 if order == 2 else 0.5) if group.hold.value == "zero-order" else 0.0
     shown = sensor_response(model.sensor.bandwidth_hz, z, group.rate_hz) * z ** (-late) * s**order
     moved = response[:, : structure.inputs] * np.array(structure.signs)[:, None] / shown[:, None, None]

@@ -57,7 +57,7 @@ def _oscillator_tolerance(structure: Structure, fit: AnyFit) -> Tolerance:
 
 def _axis_values(structure: Structure, unknowns: FloatArray) -> FloatArray:
     """(3 m,): masses, damping and stiffness to the ground at each driven axis."""
-    return np.concatenate([np.diag(part) for part in structure.grounded_parts(unknowns)])
+    return np.concatenate([np.diag(part) for part in structure.find_grounded_parts(unknowns)])
 
 
 def _covariance(fit: AnyFit) -> FloatArray:

@@ -61,7 +61,7 @@ def pole_form(model: MechanicalModel) -> PoleForm:
     return PoleForm(poles.astype(complex), C @ vectors, inverse @ B, direct, inverse.astype(complex))
 
 
-def sampled_response(
+def sample_response(
     model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, hold: Hold, form: PoleForm | None = None
 ) -> ComplexArray:
     """Frequency response (lines, p, m), sensor and delay included; frequencies above zero. form: the model's, if

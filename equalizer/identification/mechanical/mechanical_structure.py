@@ -148,7 +148,7 @@ class Structure:
     def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
         """The model in relative coordinates. Raises MechanicalModelError where the mass is not positive definite."""
         m, part = self.inputs, self.slices
-        mass, damping, stiffness = self.grounded_parts(unknowns)
+        mass, damping, stiffness = self.find_grounded_parts(unknowns)
         frequency, ratio, participation, seen = self.oscillators(unknowns)
         own = np.diag(self.signs) @ _cayley_rotation(unknowns[part["turn"]], m)
         rows = np.concatenate([own, unknowns[part["rows"]].reshape(-1, m)])
@@ -170,7 +170,7 @@ class Structure:
         lower = _unpack_triangle(joint[:-1], m)
         return insert_joint(whole, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
 
-    def grounded_parts(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def find_grounded_parts(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Mass (without the oscillators'), damping and stiffness at the driven axes, (m, m) each."""
         m, part, units = self.inputs, self.slices, self.units
         lower = _unpack_triangle(unknowns[part["mass"]], m)
@@ -232,7 +232,7 @@ def pack_square_root(matrix: FloatArray) -> FloatArray:
 
 def start_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
     """The unknowns with an isotropic joint whose resonance is at frequency_hz."""
-    mass = structure.grounded_parts(unknowns)[0]
+    mass = structure.find_grounded_parts(unknowns)[0]
     m, part = structure.inputs, structure.slices["joint"]
     shared = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)
     begun = unknowns.copy()

@@ -11,7 +11,7 @@ from equalizer.identification.mechanical.mechanical_order import ALLOWED
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit, refine_unknowns
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_search import FoundModes, ModalSearch
-from equalizer.identification.mechanical.modal_structure import ModalStructure, balancing_factors
+from equalizer.identification.mechanical.modal_structure import ModalStructure, find_balancing_factors
 from equalizer.signals.signal import FloatArray
 
 LEAST_GAIN = 0.08
@@ -73,8 +73,8 @@ def _left_out_error(found: FoundModes) -> float:
 
 
 def balance_fit(fit: RefinedFit[ModalStructure]) -> RefinedFit[ModalStructure]:
-    """The same fit with the factors of `balancing_factors` on its unknowns; every response is unchanged."""
-    factors = balancing_factors(fit.structure, fit.unknowns)
+    """The same fit with the factors of `find_balancing_factors` on its unknowns; every response is unchanged."""
+    factors = find_balancing_factors(fit.structure, fit.unknowns)
     return replace(fit, unknowns=fit.unknowns * factors, slope=fit.slope / factors)
 
 

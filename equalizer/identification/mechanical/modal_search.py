@@ -66,7 +66,7 @@ class ModalSearch:
         solved = self._solve(np.append(logs, delay))
         low, high = np.log(2 * np.pi * np.array([self._band[0] / 2, self._band[1] * 2]))
         best = max(
-            ((self._explained_by_mode(solved, np.array([speed, np.log(ratio), delay])), speed, np.log(ratio))
+            ((self._compute_explained_by_mode(solved, np.array([speed, np.log(ratio), delay])), speed, np.log(ratio))
             for speed in np.linspace(low, high, _GRID) for ratio in _RATIOS),
         )  # fmt: skip
         half = len(logs) // 2
@@ -149,7 +149,7 @@ class ModalSearch:
             columns.append(self._project_out(change, solved.bases))
         return np.stack(columns, axis=1)
 
-    def _explained_by_mode(self, solved: _Solution, unknowns: FloatArray) -> float:
+    def _compute_explained_by_mode(self, solved: _Solution, unknowns: FloatArray) -> float:
         """Part of the residual sum of squares that one more mode explains, all shapes free."""
         answers = [self._mode_responses(group, unknowns)[:, 0] for group in self._groups]
         total = 0.0

@@ -78,7 +78,7 @@ class ModalStructure:
         return low.ravel(), high.ravel()
 
 
-def balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
+def find_balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
     """(parameters,): factors that leave every response unchanged, and limit the input shape of each mode to half of the
     slowest mode's. Sensors that are not collocated do not measure the motion at the commands, which leaves this scale
     free; the limit keeps the mass there realistic."""

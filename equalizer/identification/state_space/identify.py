@@ -112,7 +112,7 @@ def identify(
     nothing. Raises IdentificationRefused where no model can be fitted to the data.
     """
     settings = settings or IdentificationSettings()
-    tell = on_progress or (lambda _: None)
+    report = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     lines = require_lines(responses, settings)
     _refuse_foreign(records, responses[0])
@@ -120,13 +120,13 @@ def identify(
     if near is not None:
         again = RelaxedFit(retighten(near, lines, settings), bound_costs=False)
         return _assess_model((again.candidate,), again, lines, responses[0], settings)
-    found = _search(lines, settings, records, lambda share: tell(FIRST_SEARCH * share))
+    found = _search(lines, settings, records, lambda share: report(FIRST_SEARCH * share))
     after = relax_poles(
         choose_best(found), lambda freer: _search(lines, freer, records, lambda _: None), lines, settings
     )
     every = found if after.candidate in found else [*found, after.candidate]
     identified = _assess_model(tuple(every), after, lines, responses[0], settings)
-    tell(1.0)
+    report(1.0)
     return identified
 
 
@@ -134,15 +134,15 @@ def _search(
     lines: WeightedLines,
     settings: IdentificationSettings,
     records: tuple[Recording, ...],
-    tell: Callable[[float], None],
+    report: Callable[[float], None],
 ) -> list[Candidate]:
     starts = _make_starts(lines, settings, records)
     found = []
     for number, start in enumerate(starts):
-        tell(number / len(starts))
+        report(number / len(starts))
         found.append(refine_start(start, lines, settings))
     found += _spare_candidates(choose_best(found), lines, settings)
-    tell(1.0)
+    report(1.0)
     return found
 
 

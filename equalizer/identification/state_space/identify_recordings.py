@@ -17,7 +17,7 @@ from equalizer.identification.state_space.stable_poles import largest_radius
 from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
 
-HEARD_S = 1.0
+DISTURBING_DECAY_S = 1.0
 """Time constant above which the transient of a start disturbs the estimate, which leaves out its first 5 s."""
 MOST_ROUNDS = 8
 """Most repetitions in which slow transients are subtracted and the model is refined."""
@@ -68,16 +68,16 @@ def _fit_estimate(
     recordings: tuple[Recording, ...],
     settings: IdentificationSettings,
     smooth: bool | None,
-    tell: Callable[[float], None],
+    report: Callable[[float], None],
 ) -> IdentifiedRecordings:
     if smooth and settings.longest_decay_s is not None:
-        return _fit_smoothed(estimate, recordings, settings, None, tell)
-    identified = identify(estimate, settings, recordings, lambda share: tell(share / 2))
+        return _fit_smoothed(estimate, recordings, settings, None, report)
+    identified = identify(estimate, settings, recordings, lambda share: report(share / 2))
     estimate, identified = _remove_transients(estimate, identified, recordings, settings)
     if smooth is False or (smooth is None and identified.cost <= UNEXPLAINED):
-        tell(1.0)
+        report(1.0)
         return IdentifiedRecordings(estimate, estimate, identified)
-    return _fit_smoothed(estimate, recordings, settings, identified, lambda share: tell(0.5 + share / 2))
+    return _fit_smoothed(estimate, recordings, settings, identified, lambda share: report(0.5 + share / 2))
 
 
 def _add_causes(
@@ -112,9 +112,9 @@ def _remove_transients(
     settings: IdentificationSettings,
 ) -> tuple[FrequencyResponse, Identified]:
     """Subtract the free decay of slow poles from the recordings, and identify again, until the decay settles."""
-    heard, quick = largest_radius(HEARD_S, estimate.sample_rate_hz), replace(settings, draws=0)
+    radius, quick = largest_radius(DISTURBING_DECAY_S, estimate.sample_rate_hz), replace(settings, draws=0)
     rounds = 0
-    while (slow := slow_part(identified, heard)) is not None and rounds < MOST_ROUNDS:
+    while (slow := slow_part(identified, radius)) is not None and rounds < MOST_ROUNDS:
         before, rounds = identified.slowest_decay_s, rounds + 1
         estimate = estimate_transfer(subtract_free_decay(recordings, slow))
         identified = identify(estimate, quick, near=identified.chosen)
@@ -128,7 +128,7 @@ def _fit_smoothed(
     recordings: tuple[Recording, ...],
     settings: IdentificationSettings,
     known: Identified | None,
-    tell: Callable[[float], None],
+    report: Callable[[float], None],
 ) -> IdentifiedRecordings:
     relaxed = known is not None and bool(known.relaxed)
     if known is not None and relaxed:
@@ -138,8 +138,8 @@ def _fit_smoothed(
         fitted = smooth_response(estimate)
         # Averaged lines are correlated, so the likelihood-ratio test for a longer decay does not hold on them.
         held = replace(settings, longest_decay_s=settings.decay_s)
-        identified = identify(fitted, held, recordings, tell)
-    tell(1.0)
+        identified = identify(fitted, held, recordings, report)
+    report(1.0)
     # For the same reason the cost of the bound cannot be tested on averaged lines.
     bound_costs = known is not None and known.bound_costs
     return IdentifiedRecordings(estimate, fitted, replace(identified, bound_costs=bound_costs))

@@ -66,7 +66,7 @@ def held_out_remarks(
     """Remarks, as whole sentences, on an error on the test that the fit does not explain."""
     found = [
         f"The sensor is at its limit: {channel} stays at one extreme value."
-        for channel in _clipped_channels(recordings)
+        for channel in _find_clipped_channels(recordings)
     ]
     if tested is None:
         return tuple(found)
@@ -97,7 +97,7 @@ def _largest_amplitude(recordings: Sequence[Recording], *, test: bool) -> float:
     return max(found, default=0.0)
 
 
-def _clipped_channels(recordings: Sequence[Recording]) -> tuple[str, ...]:
+def _find_clipped_channels(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Channels that repeatedly stay at the same largest or smallest value."""
     found: dict[str, None] = {}
     for recording in recordings:

@@ -1,4 +1,9 @@
-"""Comparison of model orders: singular values, error on held-out lines, multiplications per tick."""
+"""Comparison of model orders: singular values, error on held-out lines, multiplications per tick.
+
+Each order is fitted to every second line and tested on the others. The suggested order follows the one-standard-error
+rule (Breiman, Friedman, Olshen and Stone, Classification and Regression Trees, 1984): the lowest order whose error on
+held-out lines exceeds the least one by no more than the standard error of that difference.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +19,7 @@ from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import FloatArray
 
 VISIBLE = 2.0
-"""Ratio to the noise above which a singular value counts as a state."""
+"""Ratio to the noise above which a singular value counts as a state. By hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +30,7 @@ class OrderRow:
     held_out_cost: float
     """Squared error over noise variance on held-out lines: 1 plus the contribution of the model error."""
     held_out_error: float
-    """Root-mean-square error relative to the response; noise included."""
+    """Rms error on held-out lines relative to the rms response (`WeightedLines.relative_error`); noise included."""
     multiply_adds_per_tick: int
     """Multiplications for one step of the state and one output, with poles in blocks of two."""
     dense_multiply_adds_per_tick: int
@@ -39,7 +44,7 @@ class OrderReport:
     singular_values: FloatArray
     """Singular values of the whitened data, largest first: about 1 where there is only noise."""
     visible_order: int
-    """Number of singular values well above the noise."""
+    """Number of singular values above `VISIBLE`."""
     rows: tuple[OrderRow, ...]
     """Orders tried, rising."""
     held_out_noise: float
@@ -57,7 +62,7 @@ def compare_orders(
     """Fit every order to every second line and test it on the others. Raises IdentificationRefused where there are too
     few lines for the highest order."""
     settings = settings or IdentificationSettings()
-    tell = on_progress or (lambda _: None)
+    report = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     highest = replace(settings, order=max(orders))
     fit, test = (
@@ -66,7 +71,7 @@ def compare_orders(
     per_line = []
     rows = []
     for number, order in enumerate(sorted(orders)):
-        tell(number / len(orders))
+        report(number / len(orders))
         at_order = replace(settings, order=order)
         found = choose_best([refine_start(start, fit, at_order) for start in subspace_starts(fit, at_order)])
         modelled = found.fitted.response(test.z)
@@ -77,7 +82,7 @@ def compare_orders(
         rows.append(
             OrderRow(order, float(squared.mean()), error, multiply_adds(order, p, m), dense_multiply_adds(order, p, m))
         )
-    tell(1.0)
+    report(1.0)
     whole = require_lines(responses, highest)
     subspace = estimate_subspace(whole, default_horizon(max(orders), whole.response.shape[1]), settings.centre_hz)
     values = subspace.singular_values
@@ -87,7 +92,8 @@ def compare_orders(
 
 
 def multiply_adds(order: int, outputs: int, inputs: int) -> int:
-    """Multiplications per tick with poles in blocks of two: three for a block's own poles, and B, C and D."""
+    """Multiplications per tick with poles in blocks of two, as `modal_form` makes them: three per block for A, and all
+    of B, C and D."""
     return 3 * order // 2 + order * (outputs + inputs) + outputs * inputs
 
 
@@ -97,6 +103,7 @@ def dense_multiply_adds(order: int, outputs: int, inputs: int) -> int:
 
 
 def _alternate_lines(response: FrequencyResponse, first: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Mask (lines,) of every second line, from the line `first` (0 or 1) on."""
     return np.asarray(np.arange(len(response)) % 2 == first)
 
 
@@ -106,8 +113,8 @@ def _relative_noise(lines: WeightedLines) -> float:
 
 
 def _suggest_order(per_line: Sequence[FloatArray]) -> int:
-    """Index of the lowest order that is not worse by its standard error; compared line by line, so that common noise
-    cancels."""
+    """Index of the order by the one-standard-error rule. per_line: of each order, rising, the squared error (lines,)
+    over the noise variance; differences are taken line by line, so that noise common to both orders cancels."""
     lowest = int(np.argmin([cost.mean() for cost in per_line]))
     for number, cost in enumerate(per_line):
         worse = cost - per_line[lowest]

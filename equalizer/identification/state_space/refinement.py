@@ -31,13 +31,13 @@ noise."""
 def solve_input_matrices(form: ModalForm, lines: WeightedLines) -> tuple[FloatArray, FloatArray]:
     """B (n, m) and D (p, m) by weighted linear least squares, for each input separately."""
     n, p = form.C.shape[1], form.C.shape[0]
-    regressors = weighted_regressors(form, lines)
+    regressors = weight_regressors(form, lines)
     measured = stack_by_input(lines.weight * lines.response)
     solved = np.stack([_least_squares(phi, y) for phi, y in zip(regressors, measured, strict=True)], axis=1)
     return solved[:n], solved[n : n + p]
 
 
-def weighted_regressors(form: ModalForm, lines: WeightedLines) -> FloatArray:
+def weight_regressors(form: ModalForm, lines: WeightedLines) -> FloatArray:
     """(m, 2 lines p, n + p): regressors of B and D for the weighted response, real parts, then imaginary ones."""
     states = form.from_states(lines.z)
     p = form.C.shape[0]
@@ -49,7 +49,7 @@ def weighted_regressors(form: ModalForm, lines: WeightedLines) -> FloatArray:
 
 
 def stack_by_input(values: ComplexArray) -> FloatArray:
-    """(lines, p, m) complex as (m, 2 lines p) real, in the rows' order of `weighted_regressors`."""
+    """(lines, p, m) complex as (m, 2 lines p) real, in the rows' order of `weight_regressors`."""
     flat = values.transpose(2, 0, 1).reshape(values.shape[2], -1)
     return np.concatenate([flat.real, flat.imag], axis=1)
 
@@ -151,7 +151,7 @@ def _apply_step(form: ModalForm, step: FloatArray, radius: Radius) -> ModalForm:
 
 def _evaluate_form(form: ModalForm, lines: WeightedLines) -> _Point:
     """Project the measured response on the span of B and D (QR): what is left is the residual at these poles and C."""
-    phi = weighted_regressors(form, lines)
+    phi = weight_regressors(form, lines)
     size = np.linalg.norm(phi, axis=1, keepdims=True)
     size[size == 0] = 1.0
     basis, triangle = np.linalg.qr(phi / size)

@@ -28,7 +28,7 @@ class SlowMotion:
 
 
 def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
-    """Plan the slow motion of the low band by a zero-phase filter. wanted: (N, m), m/s², known beforehand and quiet at
+    """Plan the slow motion of the low band by a zero-phase filter. wanted: (N, m), m/s², known beforehand and zero at
     both ends.
 
     Two-sided, so that there is no phase error: x = a / (s² - w²), an exponential kernel that decays both ways. Of the

@@ -32,13 +32,14 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeigh
 
 RIGID_OCTAVES = 0.6
 """Width in octaves of the lowest part of the narrow band to which the rigid model is fitted: below the first
-resonance."""
+resonance. By hand."""
 RIGID_LINES = 30
-"""Lines at which the rigid model is compared."""
+"""Number of lines, evenly spaced in the logarithm of frequency, at which the rigid model is fitted. By hand."""
 LEAST_REACH = 2.0
-"""Least ratio of the two bands' upper ends: a high band with a single direction needs an octave."""
+"""Least ratio of the two bands' upper ends: a high band, whose force has a single direction, needs an octave. By
+hand."""
 BINS_PER_OCTAVE = 6
-"""Bins per octave in which two models are compared."""
+"""Bins per octave of `level_error`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +55,7 @@ class TwoModels:
             raise ValueError(
                 f"bands of {low:g} to {high:g} Hz and {lowest:g} to {highest:g} Hz do not add up: the wider one must "
                 f"begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one begin "
-                "above 2 Hz"
+                f"above {2 * EDGE_ROOM_HZ:g} Hz"
             )
         origins = [[model.provenance.get(what) for what in ("hand", "input")] for model in (self.narrow, self.wide)]
         if origins[0] != origins[1] and None not in origins[0] + origins[1]:
@@ -70,7 +71,7 @@ class BandFacts:
 
     edges_hz: tuple[float, float]
     cut_error: float
-    """Error in the middle band if the run-in and run-out were only cut off."""
+    """Error in the middle band if the run-in and run-out were cut off and the middle band not solved again."""
     whole_error: float
     """Error in the middle band if the run-in and run-out were played."""
     level_error: float | None
@@ -84,19 +85,20 @@ class BandFacts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedFeedforward:
-    """Result of `banded_feedforward`: forces from the first row on, one row per row of the wanted acceleration."""
+    """Result of `solve_banded_feedforward`: forces from the first row on, one row per row of the wanted
+    acceleration."""
 
     feedforward: Feedforward
     """Forces of all bands; their `error` is that in the middle band, by the narrow model."""
     facts: BandFacts
 
 
-def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
+def solve_banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardSettings) -> BandedFeedforward:
     """Solve for the forces of all bands. Raises ForceLimitError above the cap, TrackingError where nothing is wanted in
     the middle band or the cap leaves no solution, ValueError for an unsuitable signal or weight."""
     check_wanted(models.narrow, wanted)
     check_wanted(models.wide, wanted)
-    equalizer, rate_hz = banded_equalizer(models, settings.weight), wanted.sample_rate_hz
+    equalizer, rate_hz = make_banded_equalizer(models, settings.weight), wanted.sample_rate_hz
     below = _remove_above_band(wanted.samples, models.wide)
     played = equalizer.play(below)
     rows = played.rows_of_wanted(len(wanted))
@@ -123,7 +125,7 @@ def banded_feedforward(models: TwoModels, wanted: Signal, settings: FeedforwardS
     return BandedFeedforward(found, _collect_facts(models, equalizer, played, below, forces))
 
 
-def banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
+def make_banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
     """Equalizer in three bands, split by linear-phase filters EDGE_ROOM_HZ beyond the narrow model's band on either
     side. weight: R = weight I, of |u|². Raises ValueError for a weight outside 1e-3 to 1e-2."""
     low, high = models.narrow.band_hz
@@ -145,8 +147,9 @@ def rigid_part(model: IdentifiedModel) -> RigidModel:
 
 
 def level_error(wanted: FloatArray, played: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float | None:
-    """Relative error of the level of all axes together, by sixths of an octave: above the limit of direction perception
-    nothing else is felt. None where nothing is wanted in the band."""
+    """Relative error of the level (root of the power of all axes together) by sixths of an octave, where people no
+    longer perceive the direction of a vibration but only its level: |L_played - L_wanted| / |L_wanted|, L (bins,) from
+    the DFT, zero-padded to twice the length. wanted, played: (n, axes). None where nothing is wanted in the band."""
     length = 2 * len(wanted)
     lines_hz = np.fft.rfftfreq(length, 1 / rate_hz)
     count = max(1, round(BINS_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
@@ -173,6 +176,8 @@ def _remove_above_band(wanted: FloatArray, wide: IdentifiedModel) -> FloatArray:
 def _collect_facts(
     models: TwoModels, equalizer: BandedEqualizer, played: BandedForces, wanted: FloatArray, forces: FloatArray
 ) -> BandFacts:
+    """Predicted errors of the forces (n, inputs): the middle band's by the narrow model, the high band's by the wide
+    one. wanted: (n, axes), without what lies above the wide band."""
     edges, rows, band_hz = equalizer.split.edges, played.rows_of_wanted(len(wanted)), models.narrow.band_hz
     rate_hz, problem = models.narrow.sample_rate_hz, make_tracking_problem(models.narrow, equalizer.weights)
     whole, cut = simulate_from_rest(problem, played.entering)[rows], simulate_from_rest(problem, played.entering[rows])

@@ -21,12 +21,12 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
 from equalizer.tracking.compensation.known_forces import LAWS, Law, deadband_share, equivalent_impedance
 from equalizer.tracking.compensation.law_forces import (
-    compensating_force,
+    compute_compensating_force,
     invert_command_map,
     linear_share,
     single_axis_law,
 )
-from equalizer.tracking.feedforward.band_part import band_share, padded_length
+from equalizer.tracking.feedforward.band_part import band_share, find_padded_length
 from equalizer.tracking.feedforward.planned_motion import PlannedMotion, planned_motion
 from equalizer.tracking.learning.iteration import largest_share
 
@@ -145,7 +145,7 @@ def _force_beyond_model(
     law, force = force_law(effect, axis, motion, (model.input_channels, model.sample_rate_hz), slip)
     if identified_with_n is None:
         return force
-    length = padded_length(len(v), model.sample_rate_hz)
+    length = find_padded_length(len(v), model.sample_rate_hz)
     lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / model.sample_rate_hz), dtype=np.float64)
     inside = np.flatnonzero(band_share(lines_hz, model.band_hz) > 0)
     along = np.abs(model_response(model, lines_hz[inside])[:, axis, axis])
@@ -162,7 +162,7 @@ def force_law(
     commands, and the rate, Hz."""
     if effect.law is not None:
         letters = axis_names(sampled[0])
-        against = compensating_force(effect.law, letters, motion, sampled[1], slip)
+        against = compute_compensating_force(effect.law, letters, motion, sampled[1], slip)
         return single_axis_law(effect.law, letters, axis), against
     law, v = LAWS[effect.kind], motion.velocity[:, axis]
     if slip == 0:

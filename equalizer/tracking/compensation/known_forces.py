@@ -44,7 +44,9 @@ def _stribeck(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, sli
     return np.asarray(level * _smooth_sign(v, slip))
 
 
-def _presliding_hysteresis(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+def _compute_presliding_hysteresis(
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+) -> FloatArray:
     """Dahl's bristle by implicit steps: it bends with the motion and slips at the level."""
     longest, bent = parameters["level"] / parameters["stiffness"], 0.0
     bends = np.empty_like(x)
@@ -57,7 +59,7 @@ def _quadratic_damping(parameters: Mapping[str, float], x: FloatArray, v: FloatA
     return parameters["coefficient"] * v * np.abs(v)
 
 
-def _hardening_stiffness(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+def _compute_hardening_force(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
     return np.asarray(parameters["k3"] * x**3)
 
 
@@ -70,9 +72,9 @@ LAWS: dict[str, Law] = {
     "asymmetric_friction": _asymmetric_friction,
     "position_dependent_friction": _position_dependent_friction,
     "stribeck_friction": _stribeck,
-    "presliding_hysteresis": _presliding_hysteresis,
+    "presliding_hysteresis": _compute_presliding_hysteresis,
     "quadratic_damping": _quadratic_damping,
-    "hardening_stiffness": _hardening_stiffness,
+    "hardening_stiffness": _compute_hardening_force,
     "asymmetric_stiffness": _asymmetric_stiffness,
 }
 

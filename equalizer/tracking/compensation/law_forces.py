@@ -41,7 +41,7 @@ def reason_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
     return "" if np.isfinite(values).all() and (np.diff(values) > 0).any() else FOLDED
 
 
-def compensating_force(
+def compute_compensating_force(
     law: Law, letters: tuple[str, ...], motion: PlannedMotion, rate_hz: float, slip: float
 ) -> FloatArray:
     """(N,): force to be added to the command to cancel the law's force. slip: the speed below which a change of sign is
@@ -63,7 +63,7 @@ def single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceAgain
         motion = PlannedMotion(still, still.copy(), still.copy())
         motion.position[:, axis], motion.velocity[:, axis], motion.acceleration[:, axis] = x, v, -(wave**2) * x
         # The samples are two cycles, so that memory has settled in the second.
-        return compensating_force(law, letters, motion, len(x) / 2 * wave / (2 * np.pi), slip)
+        return compute_compensating_force(law, letters, motion, len(x) / 2 * wave / (2 * np.pi), slip)
 
     return against
 

@@ -12,7 +12,7 @@ QUIET_S = 1.0
 
 def band_part(samples: FloatArray, sample_rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
     """Part of samples (N, channels) within the band. The samples must begin and end at rest, or be noise."""
-    length = padded_length(len(samples), sample_rate_hz)
+    length = find_padded_length(len(samples), sample_rate_hz)
     lines = np.fft.rfft(samples, length, axis=0)
     share = band_share(np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64), band_hz)
     part: FloatArray = np.fft.irfft(lines * share[:, np.newaxis], length, axis=0)[: len(samples)]
@@ -28,6 +28,6 @@ def band_share(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> FloatA
     return np.asarray(0.5 - 0.5 * np.cos(np.pi * inside))
 
 
-def padded_length(samples: int, sample_rate_hz: float) -> int:
+def find_padded_length(samples: int, sample_rate_hz: float) -> int:
     """Number of samples with QUIET_S of zeros appended."""
     return samples + round(QUIET_S * sample_rate_hz)

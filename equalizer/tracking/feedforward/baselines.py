@@ -12,7 +12,7 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, inverse_response, regularised_inverse
+from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, inverse_response, invert_regularised
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ def baseline_inverses(
         acceleration_matching(model, frequency_hz),
         rigid_body(model, frequency_hz),
         raw_estimate(measured, frequency_hz),
-        identified_inverse(model, frequency_hz),
+        make_identified_inverse(model, frequency_hz),
     )
 
 
@@ -95,10 +95,10 @@ def raw_estimate(measured: FrequencyResponse, frequency_hz: FloatArray, weight: 
     entries = [np.interp(frequency_hz, lines.frequency_hz, entry) for entry in lines.response.reshape(-1, p * m).T]
     G = np.stack(entries, axis=1).reshape(-1, p, m)
     taps = round(measured.sample_rate_hz / float(np.diff(lines.frequency_hz).min()))
-    return Inverse("raw estimate", regularised_inverse(np.asarray(G, dtype=complex), weight), taps * p * m)
+    return Inverse("raw estimate", invert_regularised(np.asarray(G, dtype=complex), weight), taps * p * m)
 
 
-def identified_inverse(model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
+def make_identified_inverse(model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
     """The identified model's regularised inverse. Cost: its state, and the stored gains on it; less in modal form."""
     m, p = model.D.shape[1], model.D.shape[0]
     cost = model.order**2 + 2 * model.order * m + m * p

@@ -24,14 +24,14 @@ def inverse_response(
 ) -> ComplexArray:
     """Forces per wanted output, (lines, m, p): least squares with `weight` on the force that enters the plant."""
     G = model_response(model, frequency_hz)
-    H = regularised_inverse(G, weight)
+    H = invert_regularised(G, weight)
     if spring == NO_SPRING:
         return H
     left_to_spring = spring.force_per_acceleration(frequency_hz)[:, None, None] * (G @ H)
     return np.asarray(H - left_to_spring)
 
 
-def regularised_inverse(G: ComplexArray, weight: float) -> ComplexArray:
+def invert_regularised(G: ComplexArray, weight: float) -> ComplexArray:
     """(G* G + weight I)^-1 G*, line by line. G: (lines, p, m); returns (lines, m, p)."""
     adjoint = np.conj(np.swapaxes(G, 1, 2))
     return np.asarray(np.linalg.solve(adjoint @ G + weight * np.eye(G.shape[2]), adjoint))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.feedforward.band_part import band_share, padded_length
+from equalizer.tracking.feedforward.band_part import band_share, find_padded_length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,7 +25,7 @@ def planned_motion(
     Raises ValueError for a band that begins at zero: a constant acceleration has no bounded motion."""
     if band_hz[0] <= 0:
         raise ValueError(f"the band begins at {band_hz[0]:g} Hz; a motion about a resting place needs more than 0 Hz")
-    length = padded_length(len(wanted), sample_rate_hz)
+    length = find_padded_length(len(wanted), sample_rate_hz)
     lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64)
     s = 2j * np.pi * lines_hz
     share = band_share(lines_hz, band_hz) * np.exp(s * lead_s)

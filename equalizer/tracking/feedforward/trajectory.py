@@ -33,7 +33,7 @@ TRAJECTORY = TableKind("trajectory", ("time_s", "ax", "ay", "az"), "acceleration
 FORCES = TableKind("forces", ("time_s", "fx", "fy", "fz"), "force", "N")
 TRANSIENT = TableKind("transient", ("time_s", "a"), "acceleration", "m/s^2")
 """Acceleration along one direction, which is chosen when it is played."""
-# A table is told by its header, so no two kinds may share one.
+# A table is recognised by its header, so no two kinds may share one.
 TABLE_KINDS = (TRAJECTORY, FORCES, TRANSIENT)
 
 
@@ -64,7 +64,7 @@ class Trajectory:
 
 
 def parse_trajectory(text: str) -> Trajectory:
-    """A table of one of `TABLE_KINDS`, which its header tells apart. Raises TableError."""
+    """A table of one of `TABLE_KINDS`, recognised by its header. Raises TableError."""
     try:
         rows = list(csv.reader(io.StringIO(text.rstrip())))
     except csv.Error as error:

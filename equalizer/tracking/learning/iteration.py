@@ -85,7 +85,7 @@ class Repetition:
         start, stop = self.judged or (0, len(self.wanted))
         return float(2 * (high - low) * (stop - start) * self.wanted.shape[1] / self.sample_rate_hz)
 
-    def allowed_share(self, forces: FloatArray, correction: FloatArray) -> float:
+    def find_allowed_share(self, forces: FloatArray, correction: FloatArray) -> float:
         """The largest share of a correction, up to 1, that cap and slew allow. Both (N, m)."""
         share = 1.0 if self.cap is None else largest_share(forces, correction, self.cap)
         if self.slew is None:
@@ -230,7 +230,7 @@ def _finish(state: IterationState, verdict: Verdict) -> IterationState:
 def _correct_forces(state: IterationState, base: FloatArray, left: FloatArray, gain: float) -> IterationState:
     repetition = state.repetition
     correction = gain * fade_ends(repetition.invert(left), repetition.sample_rate_hz)
-    fitted = repetition.allowed_share(base, correction)
+    fitted = repetition.find_allowed_share(base, correction)
     if fitted < LOWEST_GAIN:
         return _finish(state, Verdict.BEST_KEPT)
     return replace(state, forces=base + fitted * correction, gains=(*state.gains, gain), fitted=(*state.fitted, fitted))

@@ -18,7 +18,8 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProbl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TurningTransient:
-    """Made by `turning_transient` or `normal_transient`. `lqr_kernel.tick` takes its arrays in a compiled loop."""
+    """Made by `make_rotatable_transient` or `normal_transient`. `lqr_kernel.tick` takes its arrays in a compiled
+    loop."""
 
     problem: TrackingProblem
     K: FloatArray
@@ -54,7 +55,7 @@ class TurningResult:
     """State after the last of these rows."""
 
 
-def turning_transient(gains: StoredGains, trajectory: FloatArray) -> TurningTransient:
+def make_rotatable_transient(gains: StoredGains, trajectory: FloatArray) -> TurningTransient:
     """Transient of a trajectory (N, p), before it is rotated. The gains have a free end, or rest as final state."""
     p = gains.problem.outputs
     return _make_transient(gains, every_rotation(require_trajectory(gains.problem, trajectory)), (p, p))

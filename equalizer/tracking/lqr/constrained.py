@@ -121,7 +121,7 @@ def track_under_cap(
 def _alternate_directions(task: _CappedTask, start: FloatArray, settings: CapSettings) -> tuple[FloatArray, float, int]:
     """Alternating direction method of multipliers. Returns forces, relative duality gap and rounds."""
     weight = _initial_penalty(task.problem)
-    gains = _penalised_gains(task.problem, len(task.wanted), weight)
+    gains = _compute_penalised_gains(task.problem, len(task.wanted), weight)
     z, scaled = task.nearest(start), np.zeros_like(start)
     best, best_cost, bound = z, task.cost(z), -np.inf
     for number in range(1, settings.rounds + 1):
@@ -139,7 +139,7 @@ def _alternate_directions(task: _CappedTask, start: FloatArray, settings: CapSet
         factor = _penalty_factor(u - z, z - before) if number % ROUNDS_BETWEEN_TUNING == 0 else 1.0
         if factor != 1.0:
             weight, scaled = weight * factor, scaled / factor
-            gains = _penalised_gains(task.problem, len(task.wanted), weight)
+            gains = _compute_penalised_gains(task.problem, len(task.wanted), weight)
     raise TrackingError(
         f"after {settings.rounds} rounds the forces under the cap of {task.cap_n:g} N are only known to be within "
         f"{gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
@@ -158,7 +158,7 @@ def _initial_penalty(problem: TrackingProblem) -> float:
     return float(np.sqrt(max(np.linalg.eigvalsh(problem.R)[0], 1e-6) * max(np.trace(curvature), 1.0)))
 
 
-def _penalised_gains(problem: TrackingProblem, samples: int, weight: float) -> StoredGains:
+def _compute_penalised_gains(problem: TrackingProblem, samples: int, weight: float) -> StoredGains:
     """Gains of the problem with the penalty weight·|u - w|²: the forces are further outputs, w is wanted beside r."""
     p, m = problem.outputs, problem.inputs
     C = np.insert(problem.C, [p] * m, np.zeros((m, problem.order)), axis=0)

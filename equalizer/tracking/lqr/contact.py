@@ -83,7 +83,7 @@ def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatA
             "give a transient with content there"
         )
     wanted = every_normal(recording, p)
-    along = [basis.predicted_response(axis) - wanted[i] for i, axis in enumerate(np.eye(p))]
+    along = [basis.predict_response(axis) - wanted[i] for i, axis in enumerate(np.eye(p))]
     lines = np.array([band_spectrum(each, rate_hz, band_hz).ravel() for each in along]) / level
     return np.asarray(lines @ lines.T)
 

@@ -56,7 +56,7 @@ def preview_tracker(problem: TrackingProblem, preview_samples: int) -> PreviewTr
         raise TrackingError(f"the preview is {preview_samples} samples; the present one at least must be known")
     gains = stationary_gains(problem)
     K, H_inverse = gains.K[0], gains.H_inverse[0]
-    closed, linear = _closed_loop(problem, K)
+    closed, linear = _close_loop(problem, K)
     ahead = np.empty((preview_samples, problem.inputs, problem.outputs))
     ahead[0] = H_inverse @ problem.linear_cost[:, problem.order :].T
     for j in range(1, preview_samples):
@@ -84,18 +84,18 @@ def preview_loss(problem: TrackingProblem, preview_samples: int) -> PreviewLoss:
     low, high = problem.band_hz
     lines_hz = np.linspace(low, high, max(2, round((high - low) / LINE_HZ) + 1))
     z = np.exp(2j * np.pi * lines_hz / problem.sample_rate_hz)
-    played = _closed_response(problem, tracker.K, z)
+    played = _compute_closed_response(problem, tracker.K, z)
     response = np.einsum("lj,jmp->lmp", z[:, np.newaxis] ** np.arange(len(tracker)), tracker.ahead)
     return PreviewLoss(_relative_error(played @ response), _relative_error(played @ _full_preview(problem, z)))
 
 
-def _closed_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _close_loop(problem: TrackingProblem, K: FloatArray) -> tuple[FloatArray, FloatArray]:
     """A - B K, and (C - D K)' Q of the tracked outputs, (n, p)."""
     n = problem.order
     return problem.A - problem.B @ K, (problem.linear_cost[:, :n] - problem.linear_cost[:, n:] @ K).T
 
 
-def _closed_response(problem: TrackingProblem, K: FloatArray, z: ComplexArray) -> ComplexArray:
+def _compute_closed_response(problem: TrackingProblem, K: FloatArray, z: ComplexArray) -> ComplexArray:
     """(lines, p, m): response to forces that are added to -K x."""
     n, p = problem.order, problem.outputs
     closed = problem.A - problem.B @ K
@@ -106,7 +106,7 @@ def _closed_response(problem: TrackingProblem, K: FloatArray, z: ComplexArray) -
 def _full_preview(problem: TrackingProblem, z: ComplexArray) -> ComplexArray:
     """(lines, m, p): feedforward with unlimited preview, the sum over all samples ahead in closed form."""
     gains = stationary_gains(problem)
-    closed, linear = _closed_loop(problem, gains.K[0])
+    closed, linear = _close_loop(problem, gains.K[0])
     turn = z[:, np.newaxis, np.newaxis]
     costate = turn * np.linalg.solve(np.eye(problem.order) - turn * closed.T, linear.astype(complex)[np.newaxis])
     now = problem.linear_cost[:, problem.order :].T

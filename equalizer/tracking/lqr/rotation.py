@@ -30,7 +30,7 @@ class RotationBasis:
         """(N, m). Raises TrackingError on another shape of the direction."""
         return self._combine(self.stored_forces, direction, self.inputs)
 
-    def predicted_response(self, direction: FloatArray) -> FloatArray:
+    def predict_response(self, direction: FloatArray) -> FloatArray:
         """(N, p): the model's response to these forces."""
         return self._combine(self.stored_answers, direction, self.direction_shape[0])
 

@@ -13,7 +13,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_split import Bands, CausalSplit
 from equalizer.tracking.feedforward.feedforward import band_edges
-from equalizer.tracking.lqr.changing_direction import TurningTransient, turning_transient
+from equalizer.tracking.lqr.changing_direction import TurningTransient, make_rotatable_transient
 from equalizer.tracking.lqr.lqr import TrackResult, stored_gains
 from equalizer.tracking.lqr.padding import CAUSAL
 from equalizer.tracking.lqr.preview import PreviewLoss, PreviewTracker, preview_loss, preview_tracker, stream
@@ -93,7 +93,7 @@ def realtime_controller(
     return RealtimeController(
         preview_tracker(problem, preview),
         CausalSplit(band_edges(model), model.sample_rate_hz),
-        turning_transient(stored_gains(problem, len(played)), played),
+        make_rotatable_transient(stored_gains(problem, len(played)), played),
         preview_loss(problem, preview),
         settings.cap_n,
     )

@@ -166,9 +166,11 @@ def _is_resonance(mode: BandMode, start: FloatArray, band_hz: tuple[float, float
 
 
 def _make_mode(lines: BandLines, pair: FloatArray, residue: ComplexArray, rate_hz: float) -> BandMode:
-    bare = BandMode(float(pair[0]), min(float(pair[1]), 0.95), residue, 0.0, rate_hz)
-    part = np.linalg.norm(bare.response(lines.z), axis=(1, 2)) / lines.size
-    return BandMode(bare.natural_hz, bare.damping_ratio, residue, float(part[lines.inside].max()), rate_hz)
+    without_share = BandMode(float(pair[0]), min(float(pair[1]), 0.95), residue, 0.0, rate_hz)
+    part = np.linalg.norm(without_share.response(lines.z), axis=(1, 2)) / lines.size
+    return BandMode(
+        without_share.natural_hz, without_share.damping_ratio, residue, float(part[lines.inside].max()), rate_hz
+    )
 
 
 def _poles(natural_hz: FloatArray, damping_ratio: FloatArray, rate_hz: float) -> ComplexArray:

@@ -15,7 +15,7 @@ from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.convergence import Convergence, convergence
-from equalizer.tracking.workspace.feedforward_at_place import used_models
+from equalizer.tracking.workspace.feedforward_at_place import select_used_models
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 LINES = 120
@@ -26,7 +26,7 @@ def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta
     """The worst case over all devices that the place may have. weight: R = weight I of the inverses. spring: acts on
     the device and is not in the models. beta: gain of learning. None for a single model without uncertainty, which
     would only be compared with itself."""
-    used = [model for _, model in used_models(at)]
+    used = [model for _, model in select_used_models(at)]
     band_hz = used[0].band_hz
     lines_hz = np.asarray(np.geomspace(*band_hz, LINES), dtype=np.float64)
     devices = [model_response(model, lines_hz) for model in used] if len(used) > 1 else []

@@ -16,7 +16,7 @@ from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 def feedforward_at(at: ModelsAtPlace, wanted: Signal, settings: FeedforwardSettings) -> Feedforward:
     """Feedforward at a place; error and loss are the worst part's, by its own model. Raises what `feedforward`
     raises."""
-    used = used_models(at)
+    used = select_used_models(at)
     if len(used) == 1:
         return feedforward(used[0][1], wanted, settings)
     # A sum may fit where a part does not; parts that fit, with weights that add up to one, have a sum that fits.
@@ -34,7 +34,7 @@ def feedforward_at(at: ModelsAtPlace, wanted: Signal, settings: FeedforwardSetti
     )
 
 
-def used_models(at: ModelsAtPlace) -> tuple[tuple[float, IdentifiedModel], ...]:
+def select_used_models(at: ModelsAtPlace) -> tuple[tuple[float, IdentifiedModel], ...]:
     """Models with a weight above zero, with their weights, restricted to the band that all of them cover."""
     used = [(weight, model) for weight, model in zip(at.weights, at.models, strict=True) if weight > 0]
     band_hz = max(model.band_hz[0] for _, model in used), min(model.band_hz[1] for _, model in used)
@@ -43,7 +43,7 @@ def used_models(at: ModelsAtPlace) -> tuple[tuple[float, IdentifiedModel], ...]:
 
 def inverse_at(at: ModelsAtPlace, weight: float) -> InverseOfLength:
     """Weighted sum of the inverse operators of all models at a place. weight: R = weight I, of |u|²."""
-    parts = [(share, inverse_operator(model, weight)) for share, model in used_models(at)]
+    parts = [(share, inverse_operator(model, weight)) for share, model in select_used_models(at)]
 
     def of_length(rows: int) -> Invert:
         inverses = [(share, inverse(rows)) for share, inverse in parts]

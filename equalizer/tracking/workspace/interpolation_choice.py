@@ -143,16 +143,16 @@ def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, Mo
 def _check_place(
     workspace: WorkspaceModels, modal: ModalInterpolation | None, place: HeldOutPlace, weight: float
 ) -> PlaceCheck:
-    blended = _equalized_response(blend_at(workspace, place.place_m), place, weight)
+    blended = _compute_equalized_response(blend_at(workspace, place.place_m), place, weight)
     if modal is None:
         return PlaceCheck(place.place_m, measure_quality(blended), None, _rms_error(blended), None)
-    moved = _equalized_response(modal.at(place.place_m), place, weight)
+    moved = _compute_equalized_response(modal.at(place.place_m), place, weight)
     return PlaceCheck(
         place.place_m, measure_quality(blended), measure_quality(moved), _rms_error(blended), _rms_error(moved)
     )
 
 
-def _equalized_response(at: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:
+def _compute_equalized_response(at: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:
     return np.asarray(place.response @ at.inverse(place.frequency_hz, weight))
 
 

@@ -26,7 +26,7 @@ POLES_FROM, POLES_TO = 0.3, 4.5
 RANK_SHARE = 0.1
 """Singular values of a residue below this share of the largest are what interpolation adds to it."""
 POOR_FIT = 0.02
-"""Relative error of the remainder's model from which the user is told."""
+"""Relative error of the remainder's model above which a remark is made."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

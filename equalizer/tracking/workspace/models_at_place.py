@@ -27,12 +27,12 @@ class ModelsAtPlace:
         self, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
     ) -> ComplexArray:
         """Steady-state forces per wanted output, (lines, m, p)."""
-        parts = [w * inverse_response(model, frequency_hz, weight, spring) for w, model in self._used_models()]
+        parts = [w * inverse_response(model, frequency_hz, weight, spring) for w, model in self._select_used_models()]
         return np.asarray(sum(parts), dtype=np.complex128)
 
     def forces(self, track: Callable[[IdentifiedModel], FloatArray]) -> FloatArray:
         """Forces of a trajectory: the weighted sum of what `track` returns for each model."""
-        return np.asarray(sum(w * track(model) for w, model in self._used_models()), dtype=np.float64)
+        return np.asarray(sum(w * track(model) for w, model in self._select_used_models()), dtype=np.float64)
 
-    def _used_models(self) -> list[tuple[float, IdentifiedModel]]:
+    def _select_used_models(self) -> list[tuple[float, IdentifiedModel]]:
         return [(w, model) for w, model in zip(self.weights, self.models, strict=True) if w > 0]

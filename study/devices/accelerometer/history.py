@@ -42,7 +42,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArrivedSamples:
-    """What arrived within a time."""
+    """Samples that arrived within an interval, and their arrivals."""
 
     device_s: FloatArray
     """(n,), by the board's clock."""
@@ -69,7 +69,7 @@ class History:
         self._lock = threading.Lock()
 
     def add(self, samples: Samples, arrived_s: float, counts: Counts) -> None:
-        """What came in one go. counts: with it."""
+        """Append samples that arrived together at arrived_s. counts: of the source at that time."""
         device_s = 1e-6 * samples.time_us
         rows = np.column_stack((device_s, samples.restarts, samples.raw))
         with self._lock:

@@ -204,12 +204,12 @@ class PacketParser:
         self.counts = Counts(
             packets=was.packets + len(packets),
             lost=was.lost + int((steps - 1).sum()),
-            spoiled_bytes=max(was.spoiled_bytes, self._judged_bytes() - SIZE * (was.packets + len(packets))),
+            spoiled_bytes=max(was.spoiled_bytes, self._count_judged_bytes() - SIZE * (was.packets + len(packets))),
             restarts=was.restarts + int(anew.sum()),
         )
         return Samples(sequence, time_us, packets["raw"], was.restarts + np.cumsum(anew))
 
-    def _judged_bytes(self) -> int:
+    def _count_judged_bytes(self) -> int:
         """Bytes that no later ones can make part of a packet."""
         judged = max(self._used, self._received - len(self._rest))
         return judged + self._shared - sum(min(SIZE, max(0, judged - doubtful.at)) for doubtful in self._doubtful)

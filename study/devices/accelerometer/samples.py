@@ -50,8 +50,8 @@ class Source(Protocol):
         ...
 
     def read(self) -> tuple[Samples, float]:
-        """What came since, and when, by `time.monotonic`. Waits some milliseconds at the most; none where nothing
-        came. Raises anything for a broken line."""
+        """Samples since the last call, and the time of their arrival by `time.monotonic`. Waits some milliseconds at
+        the most; none where nothing came. Raises anything for a broken line."""
         ...
 
     def close(self) -> None:

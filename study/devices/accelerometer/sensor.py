@@ -48,7 +48,7 @@ class Accelerometer:
         return self._source.counts
 
     def zero(self, seconds: float = ZEROING_S) -> None:
-        """What it reads now, at rest, counts as none from now on. Raises `DeviceError` where it reads nothing."""
+        """Take the mean reading of the next seconds, at rest, as zero. Raises `DeviceError` where nothing is read."""
         since_s = time.monotonic()
         time.sleep(seconds)
         raw = self._history.stretch(since_s, time.monotonic()).raw
@@ -76,7 +76,7 @@ class Accelerometer:
         return SensedAcceleration(placed.values, _health(counts, placed.values, placed.fit))
 
     def rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
-        """What arrived in the last seconds at rest, the standard deviation of each axis (3,) in m/s², and samples per
+        """Facts about the last seconds at rest, the standard deviation of each axis (3,) in m/s², and samples per
         second."""
         now_s = time.monotonic()
         stretch = self._history.stretch(now_s - seconds, now_s)

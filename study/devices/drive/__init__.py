@@ -1,4 +1,5 @@
-"""The loop that plays forces once a millisecond, and its records. A tick: wait, sense, govern, write, tell telemetry.
+"""The loop that plays forces once a millisecond, and its records. A tick: wait, sense, govern, write, publish
+telemetry.
 
 Of a real device `realtime_drive` is the thread on the wall clock, in the scheduling class of `real_time_class`; where
 the driver has compiled halves, `compiled_drive` runs its ticks (`compiled_ticks` hands it the arrays), else

@@ -1,4 +1,4 @@
-"""Ticks of a real device without the interpreter: wait, sense, govern, write, and tell the telemetry ring.
+"""Ticks of a real device without the interpreter: wait, sense, govern, write, and fill the telemetry ring.
 
 The same as `stepped_runner` and `realtime_drive` do from Python, in the same order and to the last bit. `run_due` runs
 ticks one after another, for time that a test passes and for systems whose clock is not read here; `attend` waits for
@@ -67,7 +67,7 @@ def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
     """A tick: sense, note its time, decide the force (`govern.tick`), write it, publish it to telemetry.
 
     Returns `GOES_ON`, `OVER` where the force is off for good, or the driver's code of an error. The flags `DECIDING`
-    and `WRITING` tell the watching thread where a tick hangs.
+    and `WRITING` show the watching thread where a tick hangs.
     """
     calls, cells, samples = rig
     state, settings, loop, buffer, force, ring, _nothing = governor

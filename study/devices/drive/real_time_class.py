@@ -53,7 +53,7 @@ LINUX_ADVICE = (
 
 @dataclass(frozen=True, slots=True)
 class GrantedRights:
-    """What the system granted."""
+    """Rights that the operating system granted to the loop."""
 
     scheduled: bool
     locked: bool

@@ -178,7 +178,7 @@ class RealtimeDrive:
         return self._thread.is_alive() and not self._closing and self._glances.ask()
 
     def stop(self) -> None:
-        """After a stop was asked for: see to it that the loop hears it, or do without the loop."""
+        """After a stop was asked for: wait until the loop has taken it, or stop without the loop."""
         until_s = self._clock.now_s() + STOP_S
         while self._runner.moving and self._clock.now_s() < until_s:
             self._clock.sleep(STOP_S / 10)

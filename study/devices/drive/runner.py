@@ -98,7 +98,7 @@ class Runner(Protocol):
 
     @property
     def seen(self) -> LastReading | None:
-        """What was read last, by a tick or a glance. None before that, and where the rig is gone. From any thread."""
+        """The last reading, by a tick or a glance. None before that, and where the rig is gone. From any thread."""
         ...
 
     def prepare(self) -> None:
@@ -168,11 +168,11 @@ class CompiledRunner:
         try:
             rig.sense(rig.state, rig.parameters, self._glance_noise, reading)
             self._seen = LastReading(reading, rig.buttons())
-        except Exception:  # noqa: BLE001 - a look hears that there is no reading
+        except Exception:  # noqa: BLE001 - a look finds no reading
             self._seen = None
 
     def run(self, ticks: int) -> None:
-        """In blocks of `block_ticks`; after each, the reading is kept for `seen`."""
+        """Run ticks in blocks of `block_ticks`; after each, the reading is kept for `seen`."""
         try:
             for start in range(0, ticks, self._block_ticks):
                 self._run_block(min(self._block_ticks, ticks - start))
@@ -183,7 +183,7 @@ class CompiledRunner:
             self.give_up(error)
 
     def drop(self, fault: Fault) -> None:
-        """One tick is run after it, in which the rig is given zero force."""
+        """End with this fault; one more tick is run, in which the rig is given zero force."""
         self._governor.abandon(fault)
         self._run_block(1)
 
@@ -192,7 +192,7 @@ class CompiledRunner:
         self._governor.abandon(Fault.LOST)
 
     def cut(self) -> None:
-        """Nothing to do: no block is long, and each tick of it hears the stop."""
+        """Nothing to do: no block is long, and the stop is taken at each tick of it."""
 
     def disconnect(self) -> None:
         if self._governor.moving:

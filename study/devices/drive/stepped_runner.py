@@ -42,7 +42,7 @@ class Standby:
             return False
 
     def end(self) -> None:
-        """After what was asked for so far."""
+        """End the thread after the calls that are queued."""
         self._asked.put(None)
 
     def _run_thread(self) -> None:
@@ -89,7 +89,7 @@ class SteppedRunner:
 
     @property
     def moving(self) -> bool:
-        """Also between the decision of a force and its being written."""
+        """Whether a force acts or is about to: also between its decision and its being written."""
         return self._governor.moving or bool(self.loop_state[DECIDING])
 
     @property
@@ -105,7 +105,7 @@ class SteppedRunner:
         return self._compiled is not None and self._compiled.attends
 
     def prepare(self) -> None:
-        """What moves by itself needs no telling."""
+        """Nothing to prepare: the device moves by itself."""
 
     @property
     def _is_gone(self) -> bool:
@@ -116,11 +116,11 @@ class SteppedRunner:
             return
         try:
             self._seen = LastReading(self._read(), self._rig.buttons())
-        except Exception:  # noqa: BLE001 - a look hears that there is no reading; the next tick says why
+        except Exception:  # noqa: BLE001 - a look finds no reading; the next tick says why
             self._seen = None
 
     def run(self, ticks: int) -> None:
-        """In compiled code where the rig has halves for it, else tick by tick."""
+        """Run ticks, in compiled code where the rig has functions for it, else one by one from Python."""
         if self._is_gone:
             self._governor.abandon(Fault.LOST)
             return

@@ -34,13 +34,13 @@ class VirtualDrive:
         """Nothing can hang: ticks run in the caller's own thread."""
 
     def refresh(self) -> bool:
-        """Before a look: whether what the runner saw last is of now."""
+        """Update the last reading before it is looked at. Returns whether it is current."""
         if not (self._runner.moving or self._closed):
             self._runner.glance()
         return not self._closed
 
     def stop(self) -> None:
-        """The next tick hears it; none is under way."""
+        """The next tick takes it; none is under way."""
 
     def close(self) -> None:
         """Run no more ticks when the clock moves on."""

@@ -30,7 +30,7 @@ def load_library() -> Library:
     computer = this_computer(os.environ)
     path = find_library(computer)
     if path is None:
-        raise missing_library_error(computer)
+        raise make_missing_library_error(computer)
     return Library(path)
 
 
@@ -53,9 +53,9 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
         except LibraryError as error:
             failures.append(error)
         except BaseException:
-            handle.let_go()
+            handle.disconnect()
             raise
-        handle.let_go()
+        handle.disconnect()
     missing = _none_of_them(model, others, failures)
     if count <= MOST_DEVICES:
         raise missing
@@ -70,7 +70,7 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
     """
     try:
         _check_fit(handle, model)
-        handle.read_every_time()
+        handle.disable_time_guard()
         drops_after_s = handle.arm_watchdog(WATCHDOG_S)
         handle.limit_force(cap_n)
         handle.compensate_gravity(effector_mass_kg if effector_mass_kg is not None else model.effector_mass_kg)
@@ -94,7 +94,7 @@ def device_error(name: str, error: LibraryError) -> DeviceError:
     )
 
 
-def missing_library_error(computer: Computer) -> DeviceError:
+def make_missing_library_error(computer: Computer) -> DeviceError:
     """Error for a computer on which the vendor's library is not found; it lists the folders that were searched."""
     places = list(dict.fromkeys(str(folder) for folder, _ in library_patterns(computer)))
     return DeviceError(

@@ -39,11 +39,16 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
     try:
         lab = read_lab()
     except DeviceError as error:
-        return (_failed_finding("Driver", error), *_usb(), real_time_finding())
+        return (_make_failed_finding("Driver", error), *_usb(), real_time_finding())
     try:
         library = load_library()
     except DeviceError as error:
-        return (_failed_finding("Driver", error), *(_usb() or _unplugged()), real_time_finding(), *_sensor(lab))
+        return (
+            _make_failed_finding("Driver", error),
+            *(_usb() or _find_if_unplugged()),
+            real_time_finding(),
+            *_sensor(lab),
+        )
     found = DeviceFinding("Library", f"{library.path}, SDK {library.version_text}", fine=True)
     return (found, *_usb(), real_time_finding(), *_sensor(lab), *_of_device(library, MODELS[name], lab))
 
@@ -53,18 +58,18 @@ def _of_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[D
     try:
         handle = open_model(library, model)
     except DeviceError as error:
-        return [_failed_finding("Driver", error)]
+        return [_make_failed_finding("Driver", error)]
     try:
         info = info_of(handle, library, model, lab.effective_mass_kg)
         findings.append(DeviceFinding("Connection", f"{info.name}, {info.details}", fine=True))
         findings += _of_opened(handle, model, lab)
     except DeviceError as error:
-        findings.append(_failed_finding("Driver", error))
+        findings.append(_make_failed_finding("Driver", error))
     except LibraryError as error:
         advice = "Check its power and its cable, then try again."
         findings.append(DeviceFinding("Driver", f"the library says: {error}", fine=False, advice=advice))
     finally:
-        handle.let_go()
+        handle.disconnect()
     return findings
 
 
@@ -78,7 +83,7 @@ def calibrate(name: str, patience_s: float) -> None:
             "The device was not calibrated", f"Within {patience_s:g} s the library said: {error}.", CALIBRATE
         ) from error
     finally:
-        handle.let_go()
+        handle.disconnect()
 
 
 def _usb() -> list[DeviceFinding]:
@@ -91,7 +96,7 @@ def _usb() -> list[DeviceFinding]:
     ]
 
 
-def _unplugged() -> list[DeviceFinding]:
+def _find_if_unplugged() -> list[DeviceFinding]:
     """Finding on a device that is not plugged in, where the library that would say so is missing; empty where this
     system cannot say it (no Linux)."""
     if find_usb_devices() is None:
@@ -113,7 +118,7 @@ def _sensor(lab: LabSettings) -> list[DeviceFinding]:
         with contextlib.closing(lab.accelerometer.open_sensor()) as sensor:
             return list(sensor_findings(sensor))
     except DeviceError as error:
-        return [_failed_finding(SENSOR, error)]
+        return [_make_failed_finding(SENSOR, error)]
 
 
 def _of_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
@@ -181,5 +186,5 @@ def _option(model: DeviceModel) -> str:
     return next(name for name, known in MODELS.items() if known is model)
 
 
-def _failed_finding(name: str, error: DeviceError) -> DeviceFinding:
+def _make_failed_finding(name: str, error: DeviceError) -> DeviceFinding:
     return DeviceFinding(name, f"{error.title}. {error.happened}", fine=False, advice=error.do_now)

@@ -42,8 +42,8 @@ class CappedDevice(Protocol):
     def hold(self, stimulus: HeldStimulus) -> None: ...
 
     def hold_unchecked(self, stimulus: HeldStimulus) -> None:
-        """As `study.devices.safe.SafeDevice.hold_unchecked`; the other methods as those of
-        `study.devices.device.Device`."""
+        """Hold a stimulus without the check of admission: see `study.devices.safe.SafeDevice.hold_unchecked`. The other
+        methods are those of `study.devices.device.Device`."""
         ...
 
     def keep_alive(self) -> None: ...

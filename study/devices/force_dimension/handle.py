@@ -15,16 +15,17 @@ give that force and gives less of it, in the same direction."""
 WATCHDOG_UNIT_S = 125e-6
 """Unit of dhdSetWatchdog's and dhdGetWatchdog's argument (s)."""
 STATUS_SIZE = 32
-"""17 in SDK 3.17.5; room for more, since a library writes as many as it knows."""
+"""Entries of the array for dhdGetStatus: 17 in SDK 3.17.5, and room for more, since a library writes as many as it
+knows."""
 
 NO_SERIAL = 0xFFFF
-"""No device's serial number."""
+"""Serial number that no device has: not known."""
 
 POWERED_PLACE, CALIBRATED_PLACE, FORCE_ON_PLACE, BRAKING_PLACE, OFF_CAUSE_PLACE = 0, 3, 5, 6, 14
 """Indices in the library's status array."""
 
 UNPOWERED_CAUSE, UNCALIBRATED_CAUSE, BRAKED_CAUSE = 101, 102, 103
-"""Causes of our own: the library states them in other places of the status, and that its forces are on."""
+"""Causes that the library has no code for: it reports forces as on, and these causes in other entries of the status."""
 OFF_CAUSES = {
     1: "a button of the device was pressed",
     2: "the handle moved faster than the device allows",
@@ -36,14 +37,14 @@ OFF_CAUSES = {
     UNCALIBRATED_CAUSE: "it does not know its place any more, and needs to be calibrated",
     BRAKED_CAUSE: "its brakes are on",
 }
-"""Words for the library's codes of why the forces are off, and for those of our own."""
+"""Words for the causes of forces being off: the library's codes, and the three above."""
 WATCHDOG_CAUSE = 3
 """The library's code for forces that the device's watchdog switched off."""
 
-TRIES = 3
-"""Attempts to stop a device whose connection fails."""
-BRAKED_S = 0.02
-"""Longest wait, after each, for the device to say that it brakes (s): its status may be some transfers old."""
+STOP_ATTEMPTS = 3
+"""Attempts to stop a device whose connection fails. By hand."""
+BRAKED_WITHIN_S = 0.02
+"""Longest wait after each attempt for the status "braking" (s): a status may be some transfers old. By hand."""
 
 
 def why_off(cause: int) -> str:
@@ -64,7 +65,7 @@ class Status:
 
     @property
     def why_off(self) -> str:
-        """In words; brakes that are on while the device says that its forces are, are a cause of their own."""
+        """The cause in words. Brakes that are on while the device reports forces as on are a cause of their own."""
         return why_off(BRAKED_CAUSE if self.force_on and self.braking else self.off_cause)
 
     @property
@@ -74,8 +75,8 @@ class Status:
 
 
 class Handle:
-    """An open device: the vendor's functions with values in place of pointers. Raises `LibraryError` from every method
-    but `let_go`."""
+    """An open device: the vendor's functions with values in place of pointers. Every method but `disconnect` raises
+    `LibraryError`."""
 
     def __init__(self, library: Library, number: int) -> None:
         self.library = library
@@ -88,15 +89,15 @@ class Handle:
         return self._read_vector("dhdGetPosition")
 
     def velocity_mps(self) -> tuple[float, float, float]:
-        """Velocity as estimated by the library, over its last 20 ms."""
+        """Velocity of the handle (m/s), x, y, z, as the library estimates it over its last 20 ms."""
         return self._read_vector("dhdGetLinearVelocity")
 
     def set_force(self, x_n: float, y_n: float, z_n: float) -> bool:
-        """Whether the device gives less than that. From any thread."""
+        """Set the force (N). Returns whether the device gives less of it. May be called from any thread."""
         return self.library.check_answer("dhdSetForce", self._set_force(x_n, y_n, z_n, self.number)) == SCALED
 
     def force_n(self) -> tuple[float, float, float]:
-        """What the device says that it gives now."""
+        """Force (N), x, y, z, that the device reports to give now."""
         return self._read_vector("dhdGetForce")
 
     def _read_vector(self, function: str) -> tuple[float, float, float]:
@@ -125,19 +126,19 @@ class Handle:
         return (self.library.function("dhdGetSystemName")(self.number) or b"unnamed").decode("utf-8", "replace")
 
     def serial(self) -> int:
-        """`NO_SERIAL` where the library answers and says none."""
+        """Serial number; `NO_SERIAL` where the library has none."""
         number = c_ushort(NO_SERIAL)
         self.library.call("dhdGetSerialNumber", byref(number), self.number)
         return number.value
 
     def firmware(self) -> float:
-        """NaN where the library answers and says none."""
+        """Version of the firmware; NaN where the library has none."""
         version = c_double(math.nan)
         self.library.call("dhdGetVersion", byref(version), self.number)
         return version.value
 
     def enable_force(self) -> None:
-        """Zero force, from now on taken."""
+        """Release the brakes and let the device follow commands, with a force of zero."""
         self.library.call("dhdSetBrakes", 0, self.number)
         self.library.call("dhdEnableForce", 1, self.number)
         self.set_force(0.0, 0.0, 0.0)
@@ -152,14 +153,16 @@ class Handle:
         """Cap of the library itself on the norm of the force (N)."""
         self.library.call("dhdSetMaxForce", newtons, self.number)
 
-    def read_every_time(self) -> None:
-        """No reading is repeated because the last was a moment ago: a loop that keeps its own time wants each."""
+    def disable_time_guard(self) -> None:
+        """Take a new reading at every call: by default the library repeats a reading that is only a moment old, and the
+        1 kHz loop keeps its own time."""
         self.library.call("dhdEnableExpertMode")
         self.library.call("dhdSetTimeGuard", 0, self.number)
 
     def arm_watchdog(self, seconds: float) -> float:
-        """Arm the watchdog. Returns for how long the device now holds a force that no other follows, in s, as the
-        device reports it; 0: for ever."""
+        """Arm the device's watchdog, which switches the force off when no command follows in time. seconds: at most
+        0.0318 (255 units). Returns the time that the device reports (s); 0 where it has no watchdog: a force then stays
+        on."""
         self.library.call("dhdEnableExpertMode")
         units = c_ubyte()
         try:
@@ -170,16 +173,16 @@ class Handle:
         return units.value * WATCHDOG_UNIT_S
 
     def calibrate(self, patience_s: float) -> None:
-        """Wait until the handle was put where it rests, and take that as its place."""
+        """Wait, for patience_s at most, until the handle was put to its rest position, and take that as reference."""
         self.library.call("dhdReset", self.number)
         self.library.call("dhdWaitForReset", round(1000 * patience_s), self.number)
 
-    def let_go(self) -> bool:
-        """Zero force, brakes, disconnect. Whether the device took it and says so. Never raises; may be called
-        again."""
+    def disconnect(self) -> bool:
+        """Set zero force, brake and close the device. Returns whether the device confirmed that it brakes. Never
+        raises; may be called again."""
         if not self._open:
             return True
-        stopped = any(self._stop_once() for _ in range(TRIES))
+        stopped = any(self._stop_once() for _ in range(STOP_ATTEMPTS))
         with contextlib.suppress(LibraryError):
             self.library.call("dhdClose", self.number)
             self._open = False
@@ -197,10 +200,10 @@ class Handle:
             return False
 
     def _is_braked(self) -> bool:
-        """Whether the device says so, within `BRAKED_S`. Raises `LibraryError`."""
-        until_s = time.monotonic() + BRAKED_S
+        """Whether the device reports within `BRAKED_WITHIN_S` that it brakes. Raises `LibraryError`."""
+        until_s = time.monotonic() + BRAKED_WITHIN_S
         while (status := self.status()).force_on or not status.braking:
             if time.monotonic() > until_s:
                 return False
-            time.sleep(BRAKED_S / 10)
+            time.sleep(BRAKED_WITHIN_S / 10)
         return True

@@ -132,4 +132,4 @@ def vendor_linkage(name: str) -> Iterator[VendorLinkage]:
     except LibraryError as error:
         raise device_error(model.name, error) from error
     finally:
-        handle.let_go()
+        handle.disconnect()

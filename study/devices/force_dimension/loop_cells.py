@@ -79,7 +79,7 @@ OF_LIBRARY = 1
 
 
 @part
-def succeeded(answer: int) -> bool:
+def is_success(answer: int) -> bool:
     """Whether an answer of the vendor's library is success, with or without a notice."""
     return bool(0 <= answer <= HIGHEST_NOTICE)
 
@@ -115,7 +115,7 @@ def check_on(calls: Addresses, cells: FloatArray) -> int:
     """0 where the device takes forces, -1 where its watchdog has switched them off after a zero; else an error code,
     and OFF_CAUSE holds the cause."""
     status = room_for_16()
-    if not succeeded(call_int(calls[STATUS], (status, np.int32(cells[NUMBER])))):
+    if not is_success(call_int(calls[STATUS], (status, np.int32(cells[NUMBER])))):
         return record_library_failure(cells, STATUS)
     cause, on = _number_at(status, OFF_CAUSE_PLACE), _number_at(status, FORCE_ON_PLACE) != 0
     if on or cause == 0:
@@ -225,7 +225,7 @@ def _check_given(calls: Addresses, cells: FloatArray) -> int:
     acceptance was refused. One that has reported forces, and fails to, is at fault."""
     place = cells.ctypes.data + 8 * REPORTED
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
-    if not succeeded(call_int(calls[GIVEN], asked)):
+    if not is_success(call_int(calls[GIVEN], asked)):
         return record_library_failure(cells, GIVEN) if cells[REPORTS] >= ODD_FOR else 0
     if not _reports_forces(cells):
         return 0
@@ -256,7 +256,7 @@ def check_still(calls: Addresses, cells: FloatArray) -> int:
     force all the same, again and again."""
     place = cells.ctypes.data + 8 * REPORTED_AT_REST
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
-    told = succeeded(call_int(calls[GIVEN], asked))
-    reported = told and not math.hypot(cells[REPORTED_AT_REST], cells[REPORTED_AT_REST + 1]) <= ODD_N
+    answered = is_success(call_int(calls[GIVEN], asked))
+    reported = answered and not math.hypot(cells[REPORTED_AT_REST], cells[REPORTED_AT_REST + 1]) <= ODD_N
     cells[ODD_AT_REST] = cells[ODD_AT_REST] + 1.0 if reported else 0.0
     return 0 if cells[ODD_AT_REST] < ODD_FOR else record_failure(cells, GIVES_ANOTHER)

@@ -132,8 +132,8 @@ class ForceDimensionRig:
         return math.hypot(x, y)
 
     def given_past_this_n(self, asked_n: float) -> float:
-        """For the acceptance, with no hand on the handle: ask the library for this force along x, past the cap of this
-        file, and return the force that the device gives before the zero that follows at once. Raises `DeviceError`."""
+        """Force (N) that the device gives when asked for `asked_n` along x, past the cap of this file; zero follows at
+        once. For the acceptance only, with no hand on the handle. Raises `DeviceError`."""
         with self._sending:
             try:
                 self._handle.set_force(asked_n, 0.0, 0.0)
@@ -145,13 +145,13 @@ class ForceDimensionRig:
                     self._handle.set_force(0.0, 0.0, 0.0)
 
     def close(self) -> bool:
-        """False where the library did not confirm it. Closes the accelerometer too."""
+        """Release and close the device and its accelerometer. Returns whether the library confirmed it."""
         self._cells[loop_cells.WITHHELD_UNTIL_S] = 0.0
         self._cells[loop_cells.CLOSED] = 1.0
         self._closed.set()
         got = self._sending.acquire(LOCK_S)
         try:
-            self._cells[loop_cells.LET_GO] = self._handle.let_go()
+            self._cells[loop_cells.LET_GO] = self._handle.disconnect()
         finally:
             if got:
                 self._sending.release()
@@ -166,7 +166,7 @@ class ForceDimensionRig:
         if self._resting.ident is None or self._resting is threading.current_thread():
             return
         self._resting.join(JOIN_S)
-        if not self._handle.let_go():
+        if not self._handle.disconnect():
             self._cells[loop_cells.LET_GO] = 0.0
 
     def _repeat_zero_force(self) -> None:

@@ -53,10 +53,10 @@ def _rig(
             check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
     except LibraryError as error:
-        handle.let_go()
+        handle.disconnect()
         raise device_error(model.name, error) from error
     except BaseException:
-        handle.let_go()
+        handle.disconnect()
         raise
 
 

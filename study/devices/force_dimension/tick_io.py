@@ -45,10 +45,10 @@ from study.devices.force_dimension.loop_cells import (
     check_status,
     check_still,
     count_beyond_share,
+    is_success,
     note_sent,
     record_failure,
     record_library_failure,
-    succeeded,
 )
 from study.devices.governor.compiling import fingerprint, part
 from study.devices.governor.govern import VECTOR
@@ -103,7 +103,7 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     place = reading.ctypes.data
     asked = (np.int64(place), np.int64(place + 8), np.int64(place + 16), np.int32(cells[NUMBER]))
     answer = call_int(calls[POSITION], asked)
-    if not succeeded(answer):
+    if not is_success(answer):
         return record_library_failure(cells, POSITION)
     if cells[READS] % LOOKS_OF in LOOKS_AT:
         code = check_status(calls, cells)
@@ -132,22 +132,22 @@ def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float
 
 @part
 def _wake_device(calls: Addresses, cells: FloatArray) -> int:
-    """After a silence that was longer than the watchdog. In the middle of a force that is an end; with none it is
-    not: the computer was asleep, or nothing was played."""
+    """Check the device after a pause longer than its watchdog. While a force acts, the pause ends the stimulus; without
+    one it does not: the computer was asleep, or nothing was played."""
     code = check_on(calls, cells)
     if code >= 0:
         return code
     if cells[CLOSED] != 0.0:
         return record_failure(cells, IS_CLOSED)
     number = np.int32(cells[NUMBER])
-    if not succeeded(call_int(calls[BRAKES], (np.int32(0), number))):
+    if not is_success(call_int(calls[BRAKES], (np.int32(0), number))):
         return record_library_failure(cells, BRAKES)
-    if cells[CLOSED] == 0.0 and not succeeded(call_int(calls[ENABLE], (np.int32(1), number))):
+    if cells[CLOSED] == 0.0 and not is_success(call_int(calls[ENABLE], (np.int32(1), number))):
         return record_library_failure(cells, ENABLE)
     if cells[CLOSED] != 0.0:  # the call hung while the device was closed: it is taken back
         _brake(calls, cells)
         return record_failure(cells, IS_CLOSED)
-    return 0 if succeeded(_set_force(calls, cells, 0.0, 0.0, 0.0)) else record_library_failure(cells, FORCE)
+    return 0 if is_success(_set_force(calls, cells, 0.0, 0.0, 0.0)) else record_library_failure(cells, FORCE)
 
 
 @part
@@ -168,7 +168,7 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     x, y, z = force[0], force[1], force[2]
     began_s = now_s(calls)  # the device counts from when it got the force, which may be long before the call ends
     answer = _set_force(calls, cells, x, y, z)
-    if not succeeded(answer):
+    if not is_success(answer):
         return record_library_failure(cells, FORCE)
     cells[SENT_S] = began_s
     note_sent(cells, x, y, z)
@@ -183,7 +183,7 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 def _send_zero(calls: Addresses, cells: FloatArray) -> int:
     """Send a zero force; brake where the library answers anything but success or a notice."""
     began_s = now_s(calls)
-    if not succeeded(_set_force(calls, cells, 0.0, 0.0, 0.0)):
+    if not is_success(_set_force(calls, cells, 0.0, 0.0, 0.0)):
         code = record_library_failure(cells, FORCE)
         _brake(calls, cells)  # the device may give the force before still
         return code

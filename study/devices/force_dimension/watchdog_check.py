@@ -11,7 +11,7 @@ from study.devices.force_dimension.handle import WATCHDOG_CAUSE, Handle, Status
 from study.errors import DeviceError
 
 ARMED_FOR_S = 0.05
-"""Time for which zero forces are sent before the silence."""
+"""Time for which zero forces are sent before the pause."""
 EVERY_S = 0.002
 """Interval of polling."""
 MARGIN_S = 0.02
@@ -24,7 +24,7 @@ ATTEMPTS = 5
 def check_watchdog(
     handle: Handle, drops_after_s: float, now_s: Callable[[], float], sleep: Callable[[float], None]
 ) -> float:
-    """After how many seconds of silence the device was found without force; the device takes forces again after.
+    """Time (s) without commands after which the device was found without force; the device takes forces again after.
 
     Raises `DeviceError` where it holds on, and `LibraryError`.
     """

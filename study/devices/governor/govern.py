@@ -133,7 +133,8 @@ def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
 
 @part
 def _limit_slew(state: FloatArray, settings: FloatArray, force: FloatArray) -> bool:
-    """Both ends of the step lie within the cap, and a ball is convex: so does what is left of the step."""
+    """Shorten the step from the last force to the slew limit. Both ends lie within the cap, and a ball is convex: so
+    does the shortened step. Returns whether it was beyond the limit by more than rounding."""
     x, y, z = force[0] - state[FORCE], force[1] - state[FORCE + 1], force[2] - state[FORCE + 2]
     step = norm_of(x, y, z)
     if step > settings[SLEW_STEP] * WITHIN:
@@ -196,7 +197,7 @@ def _record(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
         state[RECORDED] += 1
 
 
-def _publishing(sources: int) -> Any:
+def _compile_publish(sources: int) -> Any:
     @njit(PUBLISH_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def publish(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
         """After a tick and its force: one row into the telemetry ring, if it has room for any."""
@@ -252,4 +253,4 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
 _SOURCES = fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
 """Changes with each file whose code is compiled into the entry points."""
 tick, miss = _entry_points(_SOURCES)
-publish = _publishing(_SOURCES)
+publish = _compile_publish(_SOURCES)

@@ -1,7 +1,7 @@
-"""What a tick tells readers of the telemetry ring: one row, written where the oldest one was.
+"""The row of a tick in the telemetry ring, written where the oldest one was.
 
 There is one writer, the loop, which never waits: readers keep their own place and only ever read. A row that is being
-written is told by its index and its check, on any processor: no order of the stores is relied on.
+written is recognised by its index and its checksum, on any processor: no order of the stores is relied on.
 """
 
 import math
@@ -44,7 +44,8 @@ from study.devices.governor.compiling import part
 
 @part
 def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
-    """After `tick`, which has counted the tick already. ring (1 + rows, RING_WIDTH): a header, then the rows."""
+    """Write the row of a tick into the ring; called after `tick`, which has counted the tick already. ring (1 + rows,
+    RING_WIDTH): a header, then the rows."""
     count = ring[0, RING_COUNT]
     row = ring[1 + int(count) % (ring.shape[0] - 1)]
     aims = state[PHASE] in (PLAYING, RELEASING)

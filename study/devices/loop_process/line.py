@@ -143,7 +143,7 @@ class Line:
             self._refuse_all()
 
     def _refuse_all(self) -> None:
-        """What was begun as the pipe closed."""
+        """Answer with an error the calls that were begun as the pipe closed."""
         with contextlib.suppress(Empty):
             while True:
                 if (call := self._calls.get_nowait()) is not None:

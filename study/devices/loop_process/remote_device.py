@@ -92,7 +92,7 @@ class RemoteDevice:
 
     @property
     def info(self) -> DeviceInfo:
-        """As the device told when it was opened."""
+        """Properties of the device, as reported when it was opened."""
         return self._info
 
     @property
@@ -114,7 +114,8 @@ class RemoteDevice:
             self._call_remote(self._process.signs, "keep_alive")
 
     def fault(self) -> Fault:
-        """Where the process is lost: STOPPED after an emergency stop, FORCE_LEFT if it was told before, else LOST."""
+        """Fault of the device. Where the process is lost: STOPPED after an emergency stop, FORCE_LEFT if that was
+        reported before, else LOST."""
         try:
             fault: Fault = self._call_remote(self._process.signs, "fault")
         except DeviceError:
@@ -123,15 +124,15 @@ class RemoteDevice:
         return fault
 
     def health(self) -> Health:
-        """Where the process is lost: the counters that it told last."""
+        """Counters of the loop; where the process is lost, those that it reported last."""
         try:
             return self._note_health(self._call_remote(self._process.signs, "health"))
         except DeviceError:
             return self._health_of_the_lost()
 
     def release(self) -> Played:
-        """Where the process is lost: no recording, and the counters that it told last. May be called again after an
-        interruption."""
+        """Release the stimulus and return what was played. Where the process is lost: no recording, and the counters
+        that it reported last. May be called again after an interruption."""
         if self._lost or self._closed:
             if self._held is None:
                 self._must_be_there()

@@ -23,7 +23,7 @@ from study.devices.device import Device, Played
 from study.devices.loop_process.line import CLOSE_S, ERROR, LINES, PROGRESS, VALUE, End
 from study.devices.opening import open_device, raise_thread_priority
 
-LOOK_EVERY_S = 0.2
+POLL_EVERY_S = 0.2
 """Whether the caller's process is there still: a fork of it may hold its end of a pipe open."""
 
 LAST_ANSWER_S = 1.0
@@ -145,10 +145,10 @@ class Lifetime:
     def watch(self) -> None:
         """Ends the process where its main thread does not: the device's own watchdog then drops the force."""
         while not self.is_over():
-            time.sleep(LOOK_EVERY_S)
+            time.sleep(POLL_EVERY_S)
         due_s = time.monotonic()
         while time.monotonic() < due_s + self.patience_s:
-            time.sleep(LOOK_EVERY_S)
+            time.sleep(POLL_EVERY_S)
         os._exit(1)
 
 
@@ -168,7 +168,7 @@ def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
         ends[0].send((VALUE, device.info))
         server = DeviceServer(device, ends, at_rest=gc.collect, raise_thread_priority=raise_thread_priority)
         server.start()
-        while not (server.ended.wait(LOOK_EVERY_S) or lifetime.is_over()):
+        while not (server.ended.wait(POLL_EVERY_S) or lifetime.is_over()):
             pass
         server.close()
 

@@ -28,25 +28,25 @@ class LoopProcess:
 
     def __init__(self) -> None:
         pairs = [Pipe() for _ in LINES]
-        theirs = [end for _, end in pairs]
+        child_ends = [end for _, end in pairs]
         try:
-            self._process = _start([end.fileno() for end in theirs], theirs)
+            self._process = _start([end.fileno() for end in child_ends], child_ends)
         except OSError as error:
-            for ours, _ in pairs:
-                ours.close()
+            for own_end, _ in pairs:
+                own_end.close()
             raise DeviceError(
                 "The device's loop cannot be started",
                 f"The system refused to start the process for it: {error.strerror or error}.",
                 "Close other programs, then try again.",
             ) from error
         finally:
-            for end in theirs:
+            for end in child_ends:
                 end.close()
         self._killed = False
         try:
             self.pid = self._process.pid
             self.work, self.signs, self.look, self.stop, self.close = (
-                Line(ours, name) for (ours, _), name in zip(pairs, LINES, strict=True)
+                Line(own_end, name) for (own_end, _), name in zip(pairs, LINES, strict=True)
             )
         except BaseException:  # interrupted, or no more threads: nothing is held yet
             self.kill()

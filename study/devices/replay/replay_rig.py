@@ -1,9 +1,9 @@
 """A recording as a rig: the handle moves as recorded, independent of the commanded force.
 
-Before each stimulus the stretch is looked for whose recorded excitation is nearest to what shall be played (least
-squares over the whole stretch). Commands that were recorded so are answered exactly as they were then; others by the
-nearest there is, and no force changes anything. A repeated stimulus repeats its stretch, faded over where it begins
-anew. Between stimuli the handle rests where it is, and its sensor has noise.
+Before each stimulus, the stretch is searched whose recorded excitation is nearest to the stimulus (least squares over
+the whole stretch), and its motion is replayed: exactly for commands that were recorded, else that of the nearest ones.
+A stimulus that is repeated repeats its stretch, with a cross-fade from its end to its beginning. Between stimuli the
+handle rests where it is, and its sensor has noise.
 """
 
 from pathlib import Path
@@ -23,11 +23,12 @@ from study.errors import DeviceError, StudyError
 from study.store.formats.recording_file import read_recording
 
 REPEATED_S = 0.5
-"""Length of a repeated stimulus in whole loops: long enough that the hand's motion does not look periodic."""
+"""Least length (s) of a repeated stretch, in whole loops: long enough that the hand's motion does not look periodic.
+By hand."""
 OVER_S = 0.02
-"""Within so long the end of a repeated stretch goes over into its beginning."""
+"""Length (s) of the cross-fade from the end of a repeated stretch to its beginning. By hand."""
 NOMINAL = MODELS["omega3"]
-"""Model whose maximum force and mass a replayed device is given: a recording tells neither."""
+"""Model whose maximum force and mass are taken for the replayed device: a recording contains neither."""
 
 TICK, FIRST, LENGTH, REPEATS, OVER = range(5)
 """Indices in the state: ticks since the first row (negative before), first row of the stretch, its number of rows,
@@ -42,7 +43,8 @@ _NOISE = types.uint64[::1]
 def _entry_points(sources: int) -> tuple[Any, Any]:
     @njit(types.void(_VECTOR, _VECTOR, _NOISE, _VECTOR), cache=True, nogil=True)
     def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], reading: FloatArray) -> None:
-        """Noise of zero is a tick's. That of a look while nothing is played is not: then all is at rest."""
+        """Fill the reading of the tick in `state`. noise: (1,), 0 during ticks; else the state of the random generator,
+        for readings while nothing is played, with the handle at rest and noise in the acceleration."""
         _ = sources
         first, length, over = int(state[FIRST]), int(state[LENGTH]), int(state[OVER])
         tick = int(state[TICK])
@@ -87,7 +89,8 @@ def replay_rig(path: Path) -> CompiledRig:
         stretch = np.tile(rows, (max(1, most // len(rows)), 1)) if repeats else rows
         length = min(len(stretch), len(readings))
         over = min(round(OVER_S * rate_hz), length - 1, len(readings) - length) if repeats else 0
-        run_in = stretch[:length][length - over :]  # what comes before it anew must have been played before it then
+        # The cross-fade needs the rows before the stretch, where the end of the loop must have been played, too.
+        run_in = stretch[:length][length - over :]
         first = over + _nearest(excitation, np.concatenate([run_in, stretch[:length]]))
         state[[TICK, FIRST, LENGTH, REPEATS, OVER]] = -wait, first, length, repeats, over
 
@@ -121,7 +124,7 @@ def _nearest(excitation: FloatArray, wanted: FloatArray) -> int:
 
 
 def _readings(recording: Recording, path: Path) -> FloatArray:
-    """(n, READING_SIZE). Where the sensor clipped is not known any more."""
+    """Recorded readings (n, READING_SIZE). Clipping of the sensor is not recorded, and is 0."""
     position, response = recording.position, recording.response
     if position is None or position.samples.shape[1] != 3 or set(position.units) != {"m"}:
         raise _refusal(f"{path.name} has no position of a handle, three channels in metres.")
@@ -134,12 +137,14 @@ def _readings(recording: Recording, path: Path) -> FloatArray:
 
 
 def _noise_mps2(acceleration: FloatArray) -> float:
-    """Half width of an even noise as strong as the sensor's: what its third differences leave of any smooth motion."""
+    """Half width (m/s²) of a uniform noise as strong as the sensor's, sqrt(3) times its standard deviation: from third
+    differences, which remove smooth motion and multiply the variance of white noise by 20."""
     left = np.diff(acceleration, n=3, axis=0) / np.sqrt(20.0)
     return float(np.sqrt(3.0) * np.nanmedian(np.abs(left)) / 0.6745) if left.size else 0.0
 
 
 def _excitation(recording: Recording, path: Path) -> FloatArray:
+    """The recorded excitation (n, 3), N; the command where none was recorded. Missing samples count as 0."""
     decided: Signal = recording.command if recording.excitation is None else recording.excitation
     if decided.samples.shape[1] != 3 or set(decided.units) != {"N"}:
         raise _refusal(f"{path.name} has no force on a handle as its command, three channels in N.")

@@ -66,7 +66,7 @@ class FittedLinkage:
     """Likewise of the inertia."""
 
 
-def simulated_linkage() -> SimulatedLinkage:
+def make_simulated_linkage() -> SimulatedLinkage:
     """Linkage of the simulated omega.3 with its default parameters."""
     parameters = Omega3Parameters()
     mass_kg = effective_mass_kg(parameters, pack_parameters(parameters, False, (0.0, 0.0, 0.0)))
@@ -120,7 +120,8 @@ def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray)
 
 
 def _fit_masses(parameters: Omega3Parameters, calibration: LinkageCalibration) -> tuple[Masses, float]:
-    """What moves with the handle and what turns with each arm, by least squares: the inertia is linear in both."""
+    """Masses by least squares on the calibration's inertia matrices: that which moves with the handle and that which
+    turns with each arm; the inertia is linear in both."""
     nominal, arm_m = parameters.masses, parameters.linkage.upper_arm_m
     rates = _all_rates(parameters, calibration.position_m)
     turning = np.einsum("nki,nkj->nij", rates, rates)

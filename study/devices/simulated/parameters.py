@@ -77,7 +77,7 @@ class Mount:
 
 @dataclass(frozen=True, slots=True)
 class HandleModes:
-    """What swings on the platform. First the loom, sensor lead and cover that hang on it, lumped, on an oblique soft
+    """Oscillators on the platform. First the loom, sensor lead and cover that hang on it, lumped, on an oblique soft
     spring: the coupled resonance near 11 Hz. Then bending and twisting of handle, platform and forearms, more and
     more coupled. Invented; published are only the 11 Hz and that there are large modes from 80 Hz on."""
 

@@ -16,7 +16,7 @@ from study.evaluation.bank.proof_folder import ANSWER, DIED, FURTHER, RECORDING,
 from study.evaluation.bank.proof_seals import read_answer
 from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.text_file import read_text, write_text
-from study.workflows.run_on_executor import finished_pieces
+from study.workflows.run_on_executor import run_pieces
 
 PATIENCE_S = 1200.0
 """Longest wait for one case (s); a case takes seconds to a minute."""
@@ -148,7 +148,7 @@ def _send_cases(
     folder: ProofFolder, wanted: Sequence[str], executor: Executor, on_answered: Callable[[str], None]
 ) -> None:
     cases = ((name, (name, read_files(folder.open / name))) for name in wanted)
-    for name, document in finished_pieces(executor, answer_sent_case, cases):
+    for name, document in run_pieces(executor, answer_sent_case, cases):
         if document is None:
             _write_failure(folder.open / name)
         else:

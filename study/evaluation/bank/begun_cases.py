@@ -33,8 +33,9 @@ def show_case(folder: ProofFolder, place: Path) -> None:
 
 
 @contextmanager
-def finished_cases(folder: ProofFolder) -> Iterator[None]:
-    """Before new cases are begun: finish or remove those of a sealing that was killed. `begun` is gone afterwards."""
+def finish_begun_cases(folder: ProofFolder) -> Iterator[None]:
+    """Context of a sealing: on entry, finish or remove the cases of an earlier one that was killed; on exit, remove the
+    folder `begun`."""
     _finish_begun(folder)
     yield
     with suppress(FileNotFoundError):

@@ -18,7 +18,7 @@ from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import Workers, ask_and_count
-from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import FURTHER, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redraw_recording
@@ -52,7 +52,7 @@ def follow_up(
     if not starts:
         return ()
     again = open_proof_folder(folder.path / NEXT, plan.seed, plan.brief)
-    with finished_cases(again):
+    with finish_begun_cases(again):
         for start in starts:
             if not again.label(start.number).exists():
                 _seal(folder, again, plan, start)

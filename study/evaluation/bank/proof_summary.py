@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from analysis.evaluation.blind_test.wording import answer_text, concealed_text, figure_text, strength_text
+from analysis.evaluation.blind_test.wording import answer_text, describe_concealed, figure_text, strength_text
 from study.evaluation.bank.prove import BlindTest
 
 
@@ -15,7 +15,7 @@ def blind_test_lines(done: BlindTest) -> Iterator[str]:
     yield f"{len(score.misses)} misses in {len(done.outcomes)} cases"
     for miss in score.misses:
         strength = strength_text(miss)
-        drawn = f"{concealed_text(miss)}{f' at {strength}' if strength else ''}"
+        drawn = f"{describe_concealed(miss)}{f' at {strength}' if strength else ''}"
         yield f"  {miss.number:5d} {miss.kind}, {miss.bank}: {drawn} -> {answer_text(miss)}"
     yield from control_lines(done)
     yield ""

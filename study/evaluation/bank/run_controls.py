@@ -68,8 +68,8 @@ def _names(known: Path, begun: str) -> tuple[str, ...] | None:
         names = load_json(read_text(known))
     except (StudyError, ValueError):
         return None
-    ours = isinstance(names, list) and names == [f"{begun}{number}" for number in range(len(names))]
-    return tuple(names) if ours and names else None
+    is_complete = isinstance(names, list) and names == [f"{begun}{number}" for number in range(len(names))]
+    return tuple(names) if is_complete and names else None
 
 
 def _write(place: Path, asked: ControlInput) -> None:

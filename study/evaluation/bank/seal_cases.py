@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from study.errors import StudyError
-from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_label, seal
 from study.evaluation.challenge.draw_bank import Draw, case_of, draw
@@ -29,7 +29,8 @@ from study.workflows.worker_processes import worker_processes
 
 
 def truths(case: Case) -> list[dict[str, Any]]:
-    """One entry per concealed effect; empty where the model lacks nothing."""
+    """Concealed effects of a case as JSON values: name, place, axis, parameters; empty where the model lacks
+    nothing."""
     return [asdict(truth) for truth in case.truth]
 
 
@@ -69,7 +70,7 @@ def seal_missing(
     missing = [write for number, write in write_case.items() if not folder.label(number).exists()]
     done = len(write_case) - len(missing)
     on_sealed(done)
-    with finished_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
+    with finish_begun_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
         for finished in as_completed([pool.submit(write) for write in missing]):
             finished.result()
             done += 1
@@ -78,7 +79,8 @@ def seal_missing(
 
 
 def seal_one(folder: ProofFolder, each: Draw) -> None:
-    """Write one case; a missing label means an unfinished case."""
+    """Write one case: recording, model and settings for the diagnosis, then the label, without which the case counts as
+    unfinished."""
     place = begin_case(folder)
     case = case_of(each, place.name)
     write_recording(place / RECORDING, case.recording, precision="float32")

@@ -68,7 +68,7 @@ class FigureRow:
 
 def write_proof(done: BlindTest) -> None:
     """Write document, table and page, replacing earlier ones. Raises StudyError."""
-    folder, at = done.folder.path, answering_commit(done)
+    folder, at = done.folder.path, read_answering_commit(done)
     score = done.score
     document = {
         "seed": done.plan.seed,
@@ -110,7 +110,7 @@ def write_table(path: Path, done: BlindTest) -> None:
     held = f"{len(done.controls) - len(failed)} of {len(done.controls)} held" if done.controls else "not asked"
     lines = [
         f"# {len(done.outcomes)} cases, seeds {seeds(done)}",
-        f"# commit {answering_commit(done)}, code of the diagnosis {' '.join(done.engines)}",
+        f"# commit {read_answering_commit(done)}, code of the diagnosis {' '.join(done.engines)}",
         f"# follow-ups and controls by code {' '.join(done.beside) or 'none'}",
         f"# seal of the labels {done.seal}",
         f"# versions {json.dumps(versions())}",
@@ -126,7 +126,7 @@ def misses_table(path: Path) -> Path:
     return path.with_name(f"{path.stem}-misses{path.suffix}")
 
 
-def answering_commit(done: BlindTest) -> str:
+def read_answering_commit(done: BlindTest) -> str:
     """The commit recorded when the answers were first written; the current one where the same code gave them."""
     document = done.folder.path / DOCUMENT
     if document.exists():

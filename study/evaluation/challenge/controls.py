@@ -140,7 +140,7 @@ def _allow_one_wrong(seed: int, rig: Rig) -> tuple[ControlInput, ...]:
 
 
 def _map_samples(recording: Recording, how: Callable[[FloatArray], FloatArray], command: bool = True) -> Recording:
-    """The recording with `how` applied to response and position, and to the command unless told otherwise."""
+    """The recording with `how` applied to response and position, and to the command unless stated otherwise."""
     position = recording.position
     return replace(
         recording,

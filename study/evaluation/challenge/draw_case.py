@@ -106,7 +106,7 @@ def draw_case(
         further = further_plan(command, kind, rig)
         heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
         readings = read(device.sensor, *motion(heavier, further.command), RATE_HZ, np.random.default_rng([seed, noise]))
-        return replace(make_recording(label, further, *readings, rig), meta=added_mass_meta(added_kg))
+        return replace(make_recording(label, further, *readings, rig), meta=describe_added_mass(added_kg))
 
     return Case(recording, model, truth, again, visibility(bare, device, (free, moved), rig) if chosen else 0.0)
 
@@ -166,7 +166,7 @@ def further_plan(command: FloatArray, kind: str, rig: Rig) -> DrivePlan:
     return DrivePlan(whole, (Segment(0, len(whole), kind, float(np.abs(whole).max()), 0, "fit"),))
 
 
-def added_mass_meta(added_kg: float) -> dict[str, float]:
+def describe_added_mass(added_kg: float) -> dict[str, float]:
     """Recording metadata of an added mass; empty for none."""
     return {"added_mass_kg": added_kg} if added_kg else {}
 

@@ -71,10 +71,10 @@ def draw_plan(random: np.random.Generator, rig: Rig = WHOLE) -> DrivePlan:
     add(np.tile(together, (TEST_PERIODS, 1)), "multisine", LEVELS_N[1], rig.period, "test")
     add(_slow_sines(rig), "slow", SLOW_N, 0, "test")
     if rig.loud_n:
-        loud = np.zeros((rig.period, 3))
+        strong = np.zeros((rig.period, 3))
         for axis in rig.axes:
-            loud[:, axis] = multisine(random, rig.loud_n, rig.period)
-        add(np.tile(loud, (TEST_PERIODS, 1)), "multisine", rig.loud_n, rig.period, "test")
+            strong[:, axis] = multisine(random, rig.loud_n, rig.period)
+        add(np.tile(strong, (TEST_PERIODS, 1)), "multisine", rig.loud_n, rig.period, "test")
     return DrivePlan(np.vstack(blocks), tuple(segments))
 
 

@@ -62,28 +62,30 @@ def read(
 ) -> tuple[FloatArray, FloatArray]:
     """Measured acceleration and position, (samples, 3) each."""
     smoothed = one_pole(acceleration, 1.0 - np.exp(-2 * np.pi * sensor.bandwidth_hz / rate_hz))
-    felt = _apply_nonlinearity(sensor, smoothed @ sensor.orientation.T)
-    part = np.linspace(0.0, 1.0, len(felt))[:, None]
-    turns = 2 * np.pi * sensor.hum_hz * np.arange(len(felt))[:, None] / rate_hz
-    felt = felt + sensor.offset + sensor.drift * part + sensor.hum[0] * np.sin(turns) + sensor.hum[1] * np.cos(turns)
-    felt = _resample(felt, sensor.ppm, sensor.late_s * rate_hz)
+    signal = _apply_nonlinearity(sensor, smoothed @ sensor.orientation.T)
+    part = np.linspace(0.0, 1.0, len(signal))[:, None]
+    turns = 2 * np.pi * sensor.hum_hz * np.arange(len(signal))[:, None] / rate_hz
+    signal = (
+        signal + sensor.offset + sensor.drift * part + sensor.hum[0] * np.sin(turns) + sensor.hum[1] * np.cos(turns)
+    )
+    signal = _resample(signal, sensor.ppm, sensor.late_s * rate_hz)
     where = _resample(position, sensor.ppm, 0.0)
-    felt = np.clip(felt + random.normal(size=felt.shape) * NOISE_MPS2, -sensor.limit, sensor.limit)
+    signal = np.clip(signal + random.normal(size=signal.shape) * NOISE_MPS2, -sensor.limit, sensor.limit)
     if sensor.step > 0.0:
-        felt = sensor.step * np.round(felt / sensor.step)
+        signal = sensor.step * np.round(signal / sensor.step)
     where = where + POSITION_NOISE_M * random.normal(size=where.shape)
     where = POSITION_STEP_M * np.round(where / POSITION_STEP_M)
-    kept = _last_kept(len(felt), sensor.lost, random)
-    return felt[kept], where[kept]
+    kept = _last_kept(len(signal), sensor.lost, random)
+    return signal[kept], where[kept]
 
 
-def _apply_nonlinearity(sensor: Sensor, felt: FloatArray) -> FloatArray:
+def _apply_nonlinearity(sensor: Sensor, signal: FloatArray) -> FloatArray:
     """Static law, gain, cubic term, soft saturation, then hysteresis."""
-    felt = felt if sensor.law is None else sensor.law(felt)
-    felt = sensor.gain * felt + sensor.cubic * felt**3
+    signal = signal if sensor.law is None else sensor.law(signal)
+    signal = sensor.gain * signal + sensor.cubic * signal**3
     if sensor.bend > 0.0:
-        felt = np.tanh(sensor.bend * felt) / sensor.bend
-    return felt if sensor.play == 0.0 else play_hysteresis(felt, sensor.play)
+        signal = np.tanh(sensor.bend * signal) / sensor.bend
+    return signal if sensor.play == 0.0 else play_hysteresis(signal, sensor.play)
 
 
 def _resample(samples: FloatArray, ppm: float, late: float) -> FloatArray:

@@ -20,8 +20,8 @@ CORRECT_FIRST = "Correct it before it is sealed; from then on nothing in it may 
 
 def draw_labels(out: Path, repeats: int, seed: int | None) -> tuple[Label, ...]:
     """Write a table with every change `repeats` times, and the control (nothing is changed) twice as often, in random
-    order. Each row has a random salt, so that the seal's hash does not tell the order to anyone who tries all of them.
-    seed: None draws a secret one. Raises AlreadyThereError, CannotWriteError."""
+    order. Each row has a random salt, so that the seal's hash does not reveal the order to a reader who tries all
+    orders. seed: None draws a secret one. Raises AlreadyThereError, CannotWriteError."""
     every = [change.name for change in CHANGES for _ in range(repeats * (2 if change.name == NOTHING else 1))]
     order = np.random.default_rng(secrets.randbits(64) if seed is None else seed).permutation(len(every))
     labels = tuple(

@@ -23,7 +23,7 @@ from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare
-from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, named_sentences
+from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, describe_named
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
@@ -135,21 +135,24 @@ def _import_case(wanted: RealRecording, bounds: tuple[TimeBudget, Guard], on_pro
     except NothingToDiagnose as refusal:
         raise not_diagnosable_error(refusal.problems) from refusal
     before = () if wanted.before is None else (import_real_recording(wanted.before),)
-    every = keep_common_signals((*ready.recordings, *before))
-    recording = every.recordings[0]
+    alike = keep_common_signals((*ready.recordings, *before))
+    recording = alike.recordings[0]
     first = _model(wanted, recording, bounds, on_progress)
-    remarks = (*ready.remarks, *every.remarks, *first.remarks)
-    return _ImportedCase(recording, first.model, first.balances, remarks, every.recordings[1] if before else None)
+    remarks = (*ready.remarks, *alike.remarks, *first.remarks)
+    return _ImportedCase(recording, first.model, first.balances, remarks, alike.recordings[1] if before else None)
 
 
 def _is_plain(wanted: RealRecording) -> bool:
-    """Whether forces can be balanced directly: no model defines what its commands and responses are."""
+    """Whether a force balance of the recording is possible: neither a given model nor a reference recording fixes its
+    commands and responses."""
     return wanted.before is None and wanted.model() is None
 
 
 def _model(
     wanted: RealRecording, recording: Recording, bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> FirstModel:
+    """The given model, else a linear model fitted to the recording, and its force balance where there is no reference
+    recording. Raises StudyError."""
     given = wanted.model()
     if given is None:
         alone = DiagnosisInput((recording,), (wanted.name,), wanted.found.files, ())
@@ -209,7 +212,7 @@ def _test_on_further(test: FoundMap, wanted: RealRecording, found: Findings) -> 
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         text = problem.happened if isinstance(problem, StudyError) else f"{problem}."
         return FurtherTest(test.name, title, "", None, None, problem=text)
-    without, with_it = (each.with_gain if free else each.as_it_is for each in (retuned, after))
+    without, with_it = (each.with_gain if free else each.without_gain for each in (retuned, after))
     text = after.error + (", one factor fitted" if free else "")
     stretches = (
         () if free or after.error == "predicted force" else _stretch_of_whole(test.name, recording, retuned, after)
@@ -223,8 +226,8 @@ def _stretch_of_whole(
     """The whole recording as one held-out stretch per channel, with the errors of both models."""
     seconds = len(recording) / recording.sample_rate_hz
     return tuple(
-        HeldOutStretch(name, channel.name, channel.unit, 0.0, seconds, channel.signal, channel.left, two.left)
-        for channel, two in zip(retuned.channels, after.channels, strict=False)
+        HeldOutStretch(name, channel.name, channel.unit, 0.0, seconds, channel.signal, channel.error, with_it.error)
+        for channel, with_it in zip(retuned.channels, after.channels, strict=False)
     )
 
 
@@ -234,24 +237,26 @@ def _require_retuned(found: Findings) -> MechanicalModel:
 
 
 def _compare_pair(wanted: RealRecording, case: _ImportedCase, found: Findings) -> PairOutcome:
+    """The recordings before and after a change of the device: what was named, and the errors of the model before and
+    after it was re-tuned and effects were added."""
     assert wanted.before is not None and case.before is not None
     given = prediction_error(case.recording, case.model, "test")
     missed = prediction_error(case.before, case.model, "test")
     errors = found.diagnosis.fit.test
     return PairOutcome(
         changed=wanted.changed,
-        before=_file(wanted.before.files),
-        after=_file(wanted.found.files),
+        before=_file_names(wanted.before.files),
+        after=_file_names(wanted.found.files),
         verdict=found.diagnosis.verdict,
-        named=named_sentences(found),
+        named=describe_named(found),
         returned=found.diagnosis.returned_set,
-        as_before=given.as_it_is,
+        as_before=given.without_gain,
         gain=given.with_gain,
         retuned=errors.retuned,
         with_effects=errors.after if found.diagnosis.effects else None,
-        expected_left=missed.as_it_is,
+        expected_left=missed.without_gain,
     )
 
 
-def _file(files: Sequence[Path]) -> str:
+def _file_names(files: Sequence[Path]) -> str:
     return ", ".join(path.name for path in files)

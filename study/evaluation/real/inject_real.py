@@ -15,7 +15,7 @@ from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.evaluation.bank.answer_cases import others_sha256
 from study.evaluation.bank.ask_engine import Workers, ask_engine, is_answered
-from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import CLEAN, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
 from study.evaluation.bank.seal_cases import settings_text
@@ -70,7 +70,7 @@ def seal_injections(folder: ProofFolder, carried: Sequence[Carrier], count: int,
             "Give recordings of open loops, or leave --inject out.",
             saved="The diagnoses are written.",
         )
-    with finished_cases(folder):
+    with finish_begun_cases(folder):
         names = [_seal_injection(folder, carried, number, seed) for number in range(count)]
     seal(folder)
     return tuple(names)
@@ -83,19 +83,19 @@ def _seal_injection(folder: ProofFolder, carried: Sequence[Carrier], number: int
         return str(read_label(label)["name"])
     random = np.random.default_rng([seed, number])
     carrier = carried[number % len(carried)]
-    sound, rest = drawn_halves(carrier.recording, random)
+    intact, rest = drawn_halves(carrier.recording, random)
     effects = () if random.random() < NOTHING else _drawn_effects(rest, random)
     strength = float(random.random())
     spoiled, values = rest, dict[str, float]()
     for effect in effects:
         done = inject(spoiled, effect, strength, random)
         spoiled, values = done.recording, values | done.values
-    sound, rest, spoiled = (_nameless(without_lead(each)) for each in (sound, rest, spoiled))
-    change = held_out_change(sound, rest, spoiled) if effects else 1.0
+    intact, rest, spoiled = (_nameless(without_lead(each)) for each in (intact, rest, spoiled))
+    change = held_out_change(intact, rest, spoiled) if effects else 1.0
     place = begin_case(folder)
     (place / CLEAN).mkdir()
     write_recording(place / RECORDING, spoiled, precision="float64")
-    write_recording(place / CLEAN / RECORDING, sound, precision="float64")
+    write_recording(place / CLEAN / RECORDING, intact, precision="float64")
     write_mechanical_model(place / MODEL, carrier.model)
     write_text(place / SETTINGS, settings_text((), PROCESSOR_S))
     document = {

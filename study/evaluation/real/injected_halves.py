@@ -104,7 +104,7 @@ def _blank_lead(signal: Signal, lead: int) -> Signal:
     return replace(signal, samples=samples)
 
 
-def held_out_change(sound: Recording, rest: Recording, spoiled: Recording) -> float | None:
+def held_out_change(intact: Recording, rest: Recording, spoiled: Recording) -> float | None:
     """Visibility of a fault: ratio of the prediction error on the half with the fault to that on the same half without
     it, for a model fitted to the intact half; in the axis or channel where it is largest. None where no model can be
     fitted.
@@ -112,7 +112,7 @@ def held_out_change(sound: Recording, rest: Recording, spoiled: Recording) -> fl
     The model is the baseline of a comparison: forces along the motion where they balance, otherwise an autoregression
     of each reading. It contains no faults.
     """
-    before, after, clean = (split_into_parts([each]) for each in (rest, spoiled, sound))
+    before, after, clean = (split_into_parts([each]) for each in (rest, spoiled, intact))
     if not before or not after or not clean:
         return None
     try:

@@ -39,7 +39,7 @@ from study.store.formats.real_answer_file import read_answer_and_origin, write_r
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 from study.workflows.forked_map import processor_s, without_forking
-from study.workflows.run_on_executor import finished_pieces
+from study.workflows.run_on_executor import run_pieces
 
 RETUNED_NAME = "retuned.toml"
 """Re-tuned model, in the folder of a recording's answer."""
@@ -179,7 +179,7 @@ def _sent_answers(
     left = [(place, each) for place, each in zip(places, found.recordings, strict=True) if place not in kept]
     sent = ((place, (each.folder.name, each.name, read_files(each.folder))) for place, each in left)
     answers, end = dict(kept), DIAGNOSED_OF_BOTH if plan.inject else 0.98
-    for place, files in finished_pieces(executor, answer_sent_recording, sent, FOLDERS_AHEAD):
+    for place, files in run_pieces(executor, answer_sent_recording, sent, FOLDERS_AHEAD):
         with _new_folder_in_parents(place) as part:
             write_files(part, files)
         answers[place] = read_answer_and_origin(place / ANSWER_NAME)[0]

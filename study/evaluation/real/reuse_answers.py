@@ -60,7 +60,9 @@ def _read_earlier_answer(place: Path, real_recording: RealRecording, seconds: fl
         ) from error
     now = origin_of_answer(real_recording, seconds)
     files = {(parent.file, parent.sha256) for parent in now.parents}
-    return _EarlierAnswer(place, answer, (*_file_changes(_files_in(origin), files), *_setting_changes(origin, seconds)))
+    return _EarlierAnswer(
+        place, answer, (*_file_changes(_files_in(origin), files), *_compare_settings(origin, seconds))
+    )
 
 
 def _files_in(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
@@ -78,7 +80,7 @@ def _file_changes(then: set[tuple[str, str]], now: set[tuple[str, str]]) -> Iter
             yield f"{name} has changed" if name in names_now else f"{name} is gone"
 
 
-def _setting_changes(origin: Mapping[str, Any], seconds: float | None) -> Iterator[str]:
+def _compare_settings(origin: Mapping[str, Any], seconds: float | None) -> Iterator[str]:
     settings = origin.get("settings")
     then = settings.get("seconds", "") if isinstance(settings, dict) else ""
     if not isinstance(then, int | float | None):

@@ -10,7 +10,11 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.baselines import Inverse, baseline_inverses
 from equalizer.tracking.workspace.blended_inverse import blend_at
-from study.evaluation.reproduction.reproduce_equalized import PlacedModels, blending_driver, single_model_driver
+from study.evaluation.reproduction.reproduce_equalized import (
+    PlacedModels,
+    make_blending_driver,
+    make_single_model_driver,
+)
 from study.evaluation.reproduction.reproduce_playback import Driver, PlaybackRow, play_row
 from study.evaluation.reproduction.reproduction_plan import CENTRE, EDGE, Place, ReproductionPlan
 
@@ -56,11 +60,11 @@ def play_baselines(
 
 def _for_the_place(where: _Placement, models: PlacedModels) -> tuple[PlaybackRow, ...]:
     if where.hand:
-        return (PlaybackRow("model identified in the hand", single_model_driver(models.hand), hand=True),)
+        return (PlaybackRow("model identified in the hand", make_single_model_driver(models.hand), hand=True),)
     if where.place_m == EDGE:
         return (
             PlaybackRow(
-                "models of other places, blended, edge", blending_driver(blend_at(models.workspace, EDGE)), EDGE
+                "models of other places, blended, edge", make_blending_driver(blend_at(models.workspace, EDGE)), EDGE
             ),
         )
     return ()

@@ -52,18 +52,19 @@ def play_equalized(
     """Play all rows. on_share: progress, 0 to 1."""
     blended = blend_at(models.workspace, EDGE)
     interpolated, remarks = _interpolate_modes(models.workspace)
-    playings = _playings(models, blended) | interpolated
+    rows = _rows_to_play(models, blended) | interpolated
     found: dict[str, PlayedResponse] = {}
-    for number, (key, playing) in enumerate(playings.items(), start=1):
-        played = play_row(plan, playing)
-        plain = playing.driver is not_equalized
-        found[key] = replace(played, response=normalise_gain(played.response)) if plain else played
-        on_share(number / len(playings))
-    return _sort_rows(found, (*blended.remarks, *remarks, *_clipping_remarks(found)))
+    for number, (key, row) in enumerate(rows.items(), start=1):
+        played = play_row(plan, row)
+        # A static gain would correct its level: only the shape of the response is compared.
+        unscaled = row.driver is not_equalized
+        found[key] = replace(played, response=normalise_gain(played.response)) if unscaled else played
+        on_share(number / len(rows))
+    return _sort_rows(found, (*blended.remarks, *remarks, *_describe_clipping(found)))
 
 
-def blending_driver(models: ModelsAtPlace) -> Driver:
-    """Driver that lets every model compute its forces and blends them."""
+def make_blending_driver(models: ModelsAtPlace) -> Driver:
+    """Driver with the weighted sum of the forces that each model computes (`ModelsAtPlace.forces`)."""
 
     def drive(wanted: Signal) -> FloatArray:
         return models.forces(lambda model: periodic_command(model, wanted).samples)
@@ -71,30 +72,34 @@ def blending_driver(models: ModelsAtPlace) -> Driver:
     return drive
 
 
-def _playings(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, PlaybackRow]:
-    centre = single_model_driver(models.centre)
-    slick = single_model_driver(models.frictionless)
+def _rows_to_play(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, PlaybackRow]:
+    """What is played for each row, by the row's key: driver, place, signal and device."""
+    centre = make_single_model_driver(models.centre)
+    frictionless = make_single_model_driver(models.frictionless)
     return {
         "plain": PlaybackRow("Not equalized, centre", not_equalized),
         "equalized": PlaybackRow("Equalized, centre", centre),
         "edge_plain": PlaybackRow("Not equalized, edge", not_equalized, EDGE),
         "edge": PlaybackRow("Edge, model of the centre", centre, EDGE),
-        "edge_blended": PlaybackRow("Edge, models blended (ours)", blending_driver(blended), EDGE),
+        "edge_blended": PlaybackRow("Edge, models blended (ours)", make_blending_driver(blended), EDGE),
         "broad_plain": PlaybackRow("Not equalized, centre, all frequencies", not_equalized, signal="multisine"),
         "broad": PlaybackRow("Equalized, centre, all frequencies", centre, signal="multisine"),
         "edge_broad": PlaybackRow(
-            "Edge, models blended (ours), all frequencies", blending_driver(blended), EDGE, signal="multisine"
+            "Edge, models blended (ours), all frequencies", make_blending_driver(blended), EDGE, signal="multisine"
         ),
         "slick_plain": PlaybackRow("Not equalized, centre, without friction", not_equalized, device=FRICTIONLESS),
-        "slick": PlaybackRow("Equalized, centre, without friction", slick, device=FRICTIONLESS),
+        "slick": PlaybackRow("Equalized, centre, without friction", frictionless, device=FRICTIONLESS),
         "frictionless": PlaybackRow(
-            "Equalized, centre, all frequencies, without friction", slick, device=FRICTIONLESS, signal="multisine"
+            "Equalized, centre, all frequencies, without friction",
+            frictionless,
+            device=FRICTIONLESS,
+            signal="multisine",
         ),
     }
 
 
-def single_model_driver(model: IdentifiedModel) -> Driver:
-    """Driver that tracks with one model."""
+def make_single_model_driver(model: IdentifiedModel) -> Driver:
+    """Driver by the periodic inverse of a single model."""
     return lambda wanted: periodic_command(model, wanted).samples
 
 
@@ -102,13 +107,13 @@ def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRo
     """The row with modal interpolation, or a remark where the modes do not match."""
     try:
         at_edge = modal_interpolation(workspace).at(EDGE)
-    except ModesDoNotMatchError as doubt:
-        return {}, (f"No modes were interpolated: {doubt}.",)
-    playing = PlaybackRow("Edge, modes interpolated (ours)", blending_driver(at_edge), EDGE)
-    return {"edge_modal": playing}, at_edge.remarks
+    except ModesDoNotMatchError as mismatch:
+        return {}, (f"No modes were interpolated: {mismatch}.",)
+    row = PlaybackRow("Edge, modes interpolated (ours)", make_blending_driver(at_edge), EDGE)
+    return {"edge_modal": row}, at_edge.remarks
 
 
-def _clipping_remarks(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
+def _describe_clipping(found: Mapping[str, PlayedResponse]) -> Sequence[str]:
     return [
         f"{row.name} ({row.signal}): a cap cut the force off at {row.clipped_ticks} ticks."
         for row in found.values()

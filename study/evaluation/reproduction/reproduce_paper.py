@@ -144,8 +144,8 @@ def _make_folders(plan: ReproductionPlan) -> None:
 def _rehearse_study(plan: ReproductionPlan, steps: Steps) -> CollectedTrials:
     source = read_study_protocol(plan.protocols.study, plan.study)
     rehearsal = Rehearsal(source.protocol, source.text, subjects=plan.subjects, seed=plan.seed, data=plan.study)
-    tell = steps.of("study")
-    rehearse_study(rehearsal, plan.workers, lambda done: tell(done / plan.subjects))
+    report = steps.of("study")
+    rehearse_study(rehearsal, plan.workers, lambda done: report(done / plan.subjects))
     return collect_sessions(plan.study, source.protocol.name)
 
 

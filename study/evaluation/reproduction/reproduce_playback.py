@@ -10,7 +10,7 @@ from analysis.evaluation.reproduction.played_response import (
     PlayedResponse,
     SignalKind,
     estimate_response,
-    wanted_wave,
+    make_wanted_wave,
 )
 from equalizer.signals.excitation import apply_fades
 from equalizer.signals.signal import FloatArray, Signal
@@ -72,7 +72,7 @@ def play_row(plan: ReproductionPlan, playing: PlaybackRow) -> PlayedResponse:
 
 def _play_axes(plan: ReproductionPlan, playing: PlaybackRow, device: Device, peak_n: float) -> PlayedResponse:
     rate_hz = device.info.sample_rate_hz
-    wave = wanted_wave(playing.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
+    wave = make_wanted_wave(playing.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
     wanted, delivered, clipped = [], [], 0
     for axis in range(3):
         samples = np.zeros((len(wave), 3))

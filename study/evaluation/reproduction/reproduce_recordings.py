@@ -49,7 +49,7 @@ def record_or_load(
         record_device(recording, lambda seconds: on_share(seconds / total_s))
         found = read_recording(path)
     on_share(1.0)
-    return CachedRecording(path, found, _reduced_amplitude_warnings(found))
+    return CachedRecording(path, found, _warn_of_reduced_amplitudes(found))
 
 
 def _load_cached_recording(
@@ -76,7 +76,7 @@ def _load_cached_recording(
     return found
 
 
-def _reduced_amplitude_warnings(recording: Recording) -> tuple[str, ...]:
+def _warn_of_reduced_amplitudes(recording: Recording) -> tuple[str, ...]:
     """Warnings where the amplitude was lower than the protocol asks for; repeated on every run."""
     return tuple(
         f"Played at {about['played_amplitude_n']:.3g} N instead of {about['requested_amplitude_n']:.3g} N along "

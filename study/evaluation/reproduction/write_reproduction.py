@@ -6,8 +6,8 @@ from pathlib import Path
 
 from analysis.evaluation.reproduction.document import FigureFindings, Reproduction
 from analysis.evaluation.reproduction.ellipsoid_findings import ellipsoid_findings
-from analysis.evaluation.reproduction.equalized_findings import equalized_findings
-from analysis.evaluation.reproduction.played_response import played_row
+from analysis.evaluation.reproduction.equalized_findings import find_equalized
+from analysis.evaluation.reproduction.played_response import describe_played
 from analysis.evaluation.reproduction.response_findings import band_findings, response_findings
 from analysis.evaluation.reproduction.study_findings import direction_limit_hz, study_findings
 from analysis.figures.reproduction_pictures import reproduction_pictures
@@ -86,8 +86,8 @@ def _document(
             response_findings(results.device.response, results.device.resonances, results.device.onset),
             _equalization_findings(results),
         ),
-        played=tuple(played_row(row) for row in (*played.rows.all, *played.others)),
-        baselines=tuple(played_row(row) for row in results.baselines),
+        played=tuple(describe_played(row) for row in (*played.rows.all, *played.others)),
+        baselines=tuple(describe_played(row) for row in results.baselines),
         models=results.models,
     )
 
@@ -95,7 +95,7 @@ def _document(
 def _equalization_findings(results: Results) -> FigureFindings:
     with_it, without = results.tested, results.tested_frictionless
     tested = (with_it.error, without.error) if with_it and without else None
-    return equalized_findings(results.played.rows, tested, (*results.remarks, *results.played.remarks))
+    return find_equalized(results.played.rows, tested, (*results.remarks, *results.played.remarks))
 
 
 def _origin_entries(origin: Provenance) -> dict[str, str]:

@@ -16,7 +16,7 @@ _LOOSE = ("_", " ", ".")
 
 @dataclass(frozen=True, slots=True)
 class Groups:
-    """Runs in a file, told apart by prefixes of the arrays' names."""
+    """Runs in a file, distinguished by prefixes of the arrays' names."""
 
     prefixes: tuple[str, ...]
     """In the order of the file; empty if it holds one run."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.csv_arrays import Table, read_csv_arrays, timed_arrays
+from study.importing.arrays.csv_arrays import Table, convert_times, read_csv_arrays
 from study.importing.arrays.json_arrays import read_json_arrays
 from study.importing.arrays.mat_arrays import read_mat5_arrays
 from study.importing.arrays.stored_arrays import read_hdf5_arrays, read_npz_arrays
@@ -63,7 +63,7 @@ def left_out(array: Array) -> str:
 
 
 def read_arrays(path: Path, table: CsvMap) -> Arrays:
-    """Read all arrays of a file, whose type is told by its ending. table: how a table of text is laid out (separator,
+    """Read all arrays of a file, whose type follows from its ending. table: how a table of text is laid out (separator,
     decimal mark, header). Raises CannotReadError, ImportRefusedError."""
     try:
         open_regular(path).close()
@@ -87,7 +87,7 @@ def _read(path: Path, table: CsvMap) -> Table:
         return read_csv_arrays(path, table)
     if path.suffix.lower() in WORKBOOKS:
         return read_workbook_arrays(path, table)
-    return timed_arrays(_read_stored(path))
+    return convert_times(_read_stored(path))
 
 
 def _read_stored(path: Path) -> dict[str, Array]:

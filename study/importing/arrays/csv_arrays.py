@@ -147,7 +147,7 @@ def _is_missing(column: "pd.Series[str]") -> "pd.Series[bool]":
     return column.str.strip().str.lower().isin(EMPTY)
 
 
-def timed_arrays(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
+def convert_times(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
     """Convert arrays of dates, times, or texts of them to seconds, like columns of a table. Raises ValueError."""
     found, clocks, notes = {}, [], []
     for name, array in stored.items():

@@ -67,7 +67,7 @@ def is_empty(field: str) -> bool:
     return field.lower() in EMPTY
 
 
-def filled_width(fields: Sequence[str]) -> int:
+def count_filled_fields(fields: Sequence[str]) -> int:
     """The fields without empty ones at the end."""
     return max((place for place, field in enumerate(fields, start=1) if field), default=0)
 

@@ -14,7 +14,7 @@ from study.importing.arrays.table_cells import (
     COMMENTS,
     EMPTY,
     Line,
-    filled_width,
+    count_filled_fields,
     first_numbers,
     holds_data,
     holds_number,
@@ -62,7 +62,7 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
     whole, notes = _without_remarks_below(rows, begin, marks)
     above = _rows_above(lines, whole, begin, marks.delimiter)
     faulty = _count_faulty(whole[:begin], len(split_row(whole[begin][1], marks.delimiter)), marks)
-    least = max([len(settings.names), *map(filled_width, above[: len(above) - faulty][-2:])])
+    least = max([len(settings.names), *map(count_filled_fields, above[: len(above) - faulty][-2:])])
     rows = [*whole[: begin - faulty], *_without_empty_ends(whole[begin - faulty :], marks.delimiter, least)]
     if settings.names:
         return replace(_with_given_names(rows, begin, marks, settings), notes=notes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from study.importing.arrays.table_cells import (
     Line,
     are_numbers,
-    filled_width,
+    count_filled_fields,
     first_numbers,
     holds_number,
     is_empty,
@@ -53,7 +53,7 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
         begin = first_numbers(rows, delimiter, decimal)
         header = rows[begin - 1][1] if begin else ""
         named = split_row(header, delimiter)
-        fits = len(named) == columns or filled_width(named) == max(map(filled_width, read))
+        fits = len(named) == columns or count_filled_fields(named) == max(map(count_filled_fields, read))
         alike = fits and not _is_no_name(header, decimal, columns)
         rank = (columns == len(settings.names), len(read), not (tabbed and delimiter == " "), alike, columns)
         if rank > best:

@@ -118,7 +118,7 @@ def _require_plain(member: str, sheet: bytes) -> None:
 
 def _require_computed(sheet: Any) -> None:
     """Raises ValueError for formulas whose values were not saved."""
-    with sheet.parent._archive.open(sheet._worksheet_path) as member:  # noqa: SLF001 openpyxl tells it no other way
+    with sheet.parent._archive.open(sheet._worksheet_path) as member:  # noqa: SLF001 openpyxl has no public function for it
         if _NEVER_COMPUTED.search(member.read()):
             raise _NotReadError(
                 f"formulas of sheet '{sheet.title}' have no stored value; open it in a spreadsheet program and save it"

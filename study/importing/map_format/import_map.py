@@ -24,14 +24,12 @@ Kind = Literal["multisine", "sweep", "sine", "slow", "noise", "binary", "step", 
 class CsvMap:
     """Notation of tables, where it cannot be detected from the file itself."""
 
-    skip_lines: Annotated[int, Field(ge=0, description="Lines before the header. Default 0.")] = 0
-    delimiter: Annotated[str, Field(description="Between fields. Default: what the numbers show.")] = ""
-    decimal: Annotated[Literal["", ".", ","], Field(description="Decimal sign. Default: what the numbers show.")] = ""
+    skip_lines: Annotated[int, Field(ge=0, description="Number of lines before the header. Default 0.")] = 0
+    delimiter: Annotated[str, Field(description="Separator of fields. Default: detected.")] = ""
+    decimal: Annotated[Literal["", ".", ","], Field(description="Decimal sign. Default: detected.")] = ""
     encoding: Annotated[
         str,
-        Field(
-            description='Of the text, as "gb18030", "shift_jis", "cp1251". Default: UTF-8, UTF-16, or what it shows.'
-        ),
+        Field(description='Encoding, such as "gb18030", "shift_jis", "cp1251". Default: UTF-8, UTF-16, or detected.'),
     ] = ""
     sheet: Annotated[
         str, Field(description="The only sheet of a workbook to be read. Default: all that hold rows of numbers.")
@@ -85,8 +83,8 @@ class ChannelMap:
     role: Annotated[
         SignalRole,
         Field(
-            description="What it is. A `condition` was known beside (temperature, pressure, a setting); a `helper` is "
-            "for computed channels only and is not written."
+            description="What it is. A `condition` is a circumstance (temperature, pressure, a setting); a `helper` is "
+            "used by computed channels only and is not written."
         ),
     ]
     name: Annotated[str, Field(min_length=1, max_length=64, description="Of the channel in the recording.")]
@@ -168,7 +166,7 @@ class PairMap:
 
 @dataclass(frozen=True, config=STRICT)
 class DiagnosisMap:
-    """What `hapteq real` needs to know beside the recording itself."""
+    """What `hapteq real` uses of a recording beside its samples: model, tests, pairs, known parameters."""
 
     model: Annotated[
         str,
@@ -179,11 +177,12 @@ class DiagnosisMap:
     ] = ""
     skip: Annotated[str, Field(description="Why these recordings are not to be diagnosed. Default: they are.")] = ""
     volume_free: Annotated[
-        bool, Field(description="Whether such a test is of unknown volume, one factor for all of it. Default false.")
+        bool,
+        Field(description="Whether the level of such a test is unknown: a single gain is fitted to it. Default false."),
     ] = False
     nominal: Annotated[
         dict[str, float],
-        Field(description="What is known of the device by other means: mass, damping, stiffness, in SI."),
+        Field(description="Parameters of the device that are known by other means: mass, damping, stiffness, in SI."),
     ] = field(default_factory=dict)
     pair: Annotated[
         tuple[PairMap, ...], Field(description="Before and after, where each file is a recording of its own.")
@@ -225,7 +224,7 @@ class ImportMap:
     part: Annotated[tuple[PartMap, ...], Field(description="Parts, one [[part]] each.")] = ()
     segment: Annotated[tuple[SegmentMap, ...], Field(description="Segments, one [[segment]] each.")] = ()
     csv: Annotated[CsvMap, Field(description="How tables are written.")] = field(default_factory=CsvMap)
-    diagnosis: Annotated[DiagnosisMap, Field(description="What `hapteq real` needs to know beside it.")] = field(
+    diagnosis: Annotated[DiagnosisMap, Field(description="What `hapteq real` uses beside the samples.")] = field(
         default_factory=DiagnosisMap
     )
     meta: Annotated[

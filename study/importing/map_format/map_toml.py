@@ -143,12 +143,12 @@ _RESAMPLED = {"zero-order": "held", "linear": "linear", "band-limited": "band-li
 def _check_hold(found: ImportMap) -> Iterator[str]:
     """The interpolation of a command between samples is stated in two places, which must agree."""
     for channel in found.channel:
-        says = {"held": "zero-order"}.get(channel.resample, channel.resample)
-        if channel.role == "command" and says and (says == "zero-order") != (found.hold == "zero-order"):
+        hold = {"held": "zero-order"}.get(channel.resample, channel.resample)
+        if channel.role == "command" and hold and (hold == "zero-order") != (found.hold == "zero-order"):
             yield (
                 f"command '{channel.name}' is resampled {channel.resample}, but the recording's hold is {found.hold}; "
                 "a command either stays between its samples (held, zero-order) or it does not: "
-                f'write hold = "{says}" at the top of the map, or resample = "{_RESAMPLED[found.hold]}" here'
+                f'write hold = "{hold}" at the top of the map, or resample = "{_RESAMPLED[found.hold]}" here'
             )
 
 

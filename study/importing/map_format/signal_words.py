@@ -161,12 +161,12 @@ def roles_of(columns: Sequence[ParsedName]) -> Sequence[SignalRole] | None:
     """Roles by quantity: forces are commands, or voltages or currents if there are none, or else channels named as
     commands; accelerations and velocities are responses, or positions if there are no others; other known quantities
     are conditions. None if something is open or contradicted by a name (`open_roles` says what)."""
-    return None if open_roles(columns) else [role for role in _roles(columns, _stated_roles(columns)) if role]
+    return None if open_roles(columns) else [role for role in _roles(columns, _find_stated_roles(columns)) if role]
 
 
 def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
     """What names and quantities leave open, one clause each; empty if they determine all roles."""
-    every_said = _stated_roles(columns)
+    every_said = _find_stated_roles(columns)
     roles = _roles(columns, every_said)
     found = []
     for column, role, stated in zip(columns, roles, every_said, strict=True):
@@ -188,14 +188,14 @@ def open_roles(columns: Sequence[ParsedName]) -> tuple[str, ...]:
 def propose_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     """Roles by names, then by quantity; empty if open. A reference is a helper, and so are currents and voltages
     beside a force."""
-    all_stated = _stated_roles(columns)
+    all_stated = _find_stated_roles(columns)
     return [stated or role for stated, role in zip(all_stated, _roles(columns, all_stated), strict=True)]
 
 
 def may_be_imposed(columns: Sequence[ParsedName]) -> bool:
     """Whether there are only forces and positions, and no name says which of them is the command."""
     quantities = {column.quantity for column in columns}
-    plain = not {"command", "helper", "response"} & set(_stated_roles(columns))
+    plain = not {"command", "helper", "response"} & set(_find_stated_roles(columns))
     return plain and bool(quantities & set(_DRIVES) and quantities & set(_PLACES)) and not quantities & set(_MOTIONS)
 
 
@@ -213,7 +213,7 @@ def _role(column: ParsedName, stated: _Role, by_quantity: Mapping[str, SignalRol
     return by_quantity.get(column.quantity, "condition" if known else "")
 
 
-def _stated_roles(columns: Sequence[ParsedName]) -> list[_Role]:
+def _find_stated_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     firsts = {column.name.split("_")[0].lower() for column in columns}
     short = _SHORT if {"u", "y"} <= firsts and "x" not in firsts else {}
     found: list[_Role] = []

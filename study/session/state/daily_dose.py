@@ -16,11 +16,13 @@ from study.session.state.vibration_dose import NO_DOSE, Dose, total
 def dose_elsewhere(
     sessions: Mapping[str, SittingState], own: str, utc: str, unread: tuple[str, ...] = ()
 ) -> DoseElsewhere | None:
-    """Dose from other sessions since the last night's rest. sessions: all of the participant, by name; own: the one
-    that continues at `utc`; unread: unreadable ones. None where there is nothing.
+    """Vibration dose from the participant's other sessions since the last rest of a night's length (`NIGHT_S`).
 
-    Searched back to the last rest of a night's length between any two sessions. Between sessions only the wall clock is
-    known; a clock set back counts as no time.
+    sessions: states of all sessions of the participant, by name; own: the session that continues at the time utc (ISO
+    8601); unread: names of sessions that could not be read. None where no other session counts and all were read.
+
+    The sessions are searched backwards up to the first pause of a night's length between two of them. Between sessions
+    only the wall clock is known; a clock set back counts as no time.
     """
     until_now = {name: pass_time(sitting, Moment(utc), resumed=True) for name, sitting in sessions.items()}
     exposed = {name: sitting for name, sitting in until_now.items() if sitting.still_s is not None}

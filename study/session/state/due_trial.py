@@ -12,7 +12,7 @@ from protocols.procedure.schedule import (
     label_of,
     labels_swapped,
     practice_level_n,
-    roved_level_n,
+    rove_level_n,
 )
 from protocols.procedure.staircase import StaircaseState, level_n, to_db
 from protocols.trial import Phase
@@ -78,7 +78,7 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
     nominal_n = None
     if protocol.stimulus.rove_db and phase in _ROVED and not run.practice:
         nominal_n = newton
-        drawn_n = roved_level_n(newton, protocol.stimulus.rove_db, opened.seed, run.index, place.trial, draws)
+        drawn_n = rove_level_n(newton, protocol.stimulus.rove_db, opened.seed, run.index, place.trial, draws)
         newton = min(drawn_n, protocol.safety.stimulus_cap_n)
         level_db = to_db(newton)
     return Present(

@@ -22,7 +22,7 @@ class FillIn:
 
 @dataclass(frozen=True, slots=True)
 class CheckDevice:
-    """Before a person holds the handle."""
+    """The device is to be checked, before a person holds the handle."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ played with the hand on the handle, between trials; a reference without it, long
 import numpy as np
 
 from equalizer.signals.excitation import apply_fades
-from equalizer.signals.multisine import interleaved_multisine, lines_between
+from equalizer.signals.multisine import lines_between, make_interleaved_multisine
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray, Signal
 from protocols.definition.probes import FROM_HZ, PERIOD_S, ProbeSettings
@@ -26,7 +26,7 @@ def probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
     """(n, 3): one period whose norm peaks at 1. Axis a has every third odd line, beginning with the a-th."""
     n = round(PERIOD_S * sample_rate_hz)
     lines = lines_between(FROM_HZ, settings.to_hz, n, sample_rate_hz, odd_only=True)
-    return interleaved_multisine(lines, n, 3, PHASES_SEED)
+    return make_interleaved_multisine(lines, n, 3, PHASES_SEED)
 
 
 def probe_stimulus(settings: ProbeSettings, level_n: float, sample_rate_hz: float) -> HeldStimulus:

@@ -141,7 +141,7 @@ def _let_go(protocol: StudyProtocol, words: Words) -> Form:
 
 
 def take_the_handle(words: Words = ENGLISH_WORDS) -> Form:
-    """After a reference."""
+    """The form that asks the participant to take the handle again, after a reference probe."""
     held = _one_of("held", words["take_held"], {"yes": "yes"}, words)
     return Form(FormKind.HANDLE, words["take_title"], words["take_intro"], (held,))
 

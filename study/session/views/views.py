@@ -181,7 +181,7 @@ class HandleView:
 
 @dataclass(frozen=True, slots=True)
 class PracticeResult:
-    """After a short practice."""
+    """Result of a short practice."""
 
     passed: bool
     right: int

@@ -86,8 +86,8 @@ def _situation(watched: FollowedSession, beside: LiveInfo, now_utc: str) -> Situ
 def _of_this_sitting(watched: FollowedSession, live: Live | None) -> Live | None:
     """The live state, unless it is left over from an earlier sitting. Versions that log the monotonic clock remove
     it before a sitting; for others the times decide."""
-    ours = live is not None and (live.monotonic_s is not None or live.utc >= watched.sitting_utc)
-    return live if ours else None
+    is_current = live is not None and (live.monotonic_s is not None or live.utc >= watched.sitting_utc)
+    return live if is_current else None
 
 
 def _find_standing(watched: FollowedSession, live: Live | None, writer: bool | None) -> Standing:

@@ -46,7 +46,7 @@ def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
     except csv.Error as error:
         raise CsvError((f"this is not CSV: {error}",)) from error
     names = _present_columns(tuple(lines[0]), row_type)
-    if problem := header_problem(tuple(lines[0]), names) or _doubled_problem(lines[0]):
+    if problem := header_problem(tuple(lines[0]), names) or _find_doubled_column(lines[0]):
         raise CsvError((problem,))
     hints = get_type_hints(row_type)
     found: list[Row] = []
@@ -97,7 +97,7 @@ def header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
     return ""
 
 
-def _doubled_problem(header: Sequence[str]) -> str:
+def _find_doubled_column(header: Sequence[str]) -> str:
     """Problem with a header that names a column twice; spreadsheets leave empty names at its end."""
     names = [name.strip() for name in header]
     doubled = next((name for place, name in enumerate(names) if name and name in names[:place]), None)

@@ -107,7 +107,7 @@ def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool, seal
 
 
 def with_seal(content: bytes) -> bytes:
-    """Of a file with a user's block: the same, with its check sum in that block."""
+    """The bytes of an HDF5 file with its checksum (SHA-256 of what follows) written into its user block."""
     body = content[SEAL_BYTES:]
     return _seal(hashlib.sha256(body).hexdigest(), len(body)) + body
 

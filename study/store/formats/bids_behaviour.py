@@ -19,8 +19,8 @@ from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 VERSION = "1.10.0"
 """Version of the BIDS standard that the dataset states."""
-FIXED = ("subject", "session")
-"""Columns that are part of the file name instead."""
+IN_FILE_NAME = ("subject", "session")
+"""Columns of a trial that BIDS puts into the file's name."""
 
 PARTICIPANT_COLUMNS: dict[str, tuple[str, ...]] = {
     "age": (),
@@ -74,7 +74,7 @@ def write_bids(
             "TaskName": task,
             "TaskDescription": " ".join(part for part in (TASK, _target(protocol_text), _title(protocol_text)) if part),
             "Instructions": QUESTION,
-            **{column: _describe_column(column) for column in columns(Trial) if column not in FIXED},
+            **{column: _describe_column(column) for column in columns(Trial) if column not in IN_FILE_NAME},
         }),
     ]  # fmt: skip
     subjects = list(dict.fromkeys(trial.subject for trial in trials))
@@ -82,14 +82,14 @@ def write_bids(
     for table in dict.fromkeys(column.table for column in answers.columns):
         written += _phenotype(folder, table, answers)
     for session in dict.fromkeys(trial.session for trial in trials):
-        of = [trial for trial in trials if trial.session == session]
-        sub, ses = f"sub-{_label(of[0].subject)}", f"ses-{_label(session)}"
-        written.append(_text(folder / sub / ses / "beh" / f"{sub}_{ses}_task-{task}_beh.tsv", _tsv(of)))
+        rows = [trial for trial in trials if trial.session == session]
+        sub, ses = f"sub-{_label(rows[0].subject)}", f"ses-{_label(session)}"
+        written.append(_text(folder / sub / ses / "beh" / f"{sub}_{ses}_task-{task}_beh.tsv", _tsv(rows)))
     return tuple(written)
 
 
 def _participants(folder: Path, subjects: Sequence[str], answers: AnswerTable) -> list[Path]:
-    """The code, and of the questions before the trials those that BIDS has columns for."""
+    """participants.tsv and its JSON: the code, and those questions before the trials that BIDS defines a column for."""
     known = [
         (place, column)
         for place, column in enumerate(answers.columns)
@@ -117,7 +117,7 @@ def _participants(folder: Path, subjects: Sequence[str], answers: AnswerTable) -
 
 
 def _fits(key: str, value: str) -> bool:
-    """Whether BIDS takes it in that column."""
+    """Whether BIDS allows the value in the column `key`: n/a, one of its listed values, or a number."""
     if value == "n/a":
         return True
     return value in PARTICIPANT_COLUMNS[key] if PARTICIPANT_COLUMNS[key] else number_in(value) is not None
@@ -148,14 +148,14 @@ def _cell(answer: str) -> str:
 
 
 def _tsv(trials: Sequence[Trial]) -> str:
-    """TSV text; no value contains a comma or quote, so CSV fields can be used."""
+    """The trials as TSV. No value of a trial contains a comma or a quote, so that CSV can be split at its commas."""
     lines = [line.split(",") for line in rows_to_csv(trials, Trial).splitlines()]
-    kept = [number for number, column in enumerate(columns(Trial)) if column not in FIXED]
+    kept = [number for number, column in enumerate(columns(Trial)) if column not in IN_FILE_NAME]
     return "".join("\t".join(line[number] or "n/a" for number in kept) + "\n" for line in lines)
 
 
 def _title(protocol_text: str) -> str:
-    """Empty where the protocol has none."""
+    """Title of the protocol; empty where it has none."""
     return str(tomllib.loads(protocol_text).get("title", ""))
 
 
@@ -175,6 +175,7 @@ def _describe_column(column: str) -> dict[str, str]:
 
 
 def _label(text: str) -> str:
+    """The text as a BIDS label, which takes letters and digits only."""
     return re.sub(r"[^A-Za-z0-9]", "", text)
 
 

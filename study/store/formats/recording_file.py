@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from equalizer.signals.recording import Hold, Recording, Segment
-from equalizer.signals.recording_checks import recording_problems, signals_of
+from equalizer.signals.recording_checks import check_recording, signals_of
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import check_quantity, parse_unit
 from study.store.disk.file_errors import UnusableFileError
@@ -32,8 +32,9 @@ _SEGMENT_TYPE = np.dtype(
 )  # fmt: skip
 """A row of the dataset `segments`; its fields as in `SEGMENT_FIELDS`."""
 
-_PACK_ABOVE_BYTES = 2**18
-"""Arrays above this size are compressed; smaller ones are too small to gain by it."""
+_COMPRESS_ABOVE_BYTES = 2**18
+"""Arrays above this size are compressed. By hand: smaller ones, of which a session has thousands, are written faster
+without."""
 
 
 def read_recording(path: Path | str) -> Recording:
@@ -60,7 +61,7 @@ def read_recording(path: Path | str) -> Recording:
     if problems.found or command is None or response is None:
         raise UnusableFileError(path, KIND, tuple(problems.found))
     recording = Recording(device, command, response, position, excitation, time_s, hold, segments, meta, condition)
-    if wrong := recording_problems(recording):
+    if wrong := check_recording(recording):
         raise UnusableFileError(path, KIND, wrong)
     return recording
 
@@ -74,7 +75,7 @@ def write_recording(
 ) -> None:
     """Write a recording. `precision` applies to command, response and excitation; position and time are always
     float64, for micrometres in a large workspace. Raises StudyError; ValueError for an inconsistent recording."""
-    if wrong := recording_problems(recording):
+    if wrong := check_recording(recording):
         raise ValueError(f"this recording cannot be written: {'; '.join(wrong)}")
 
     def fill(file: Any) -> None:
@@ -103,9 +104,10 @@ def _rate(file: Any) -> float:
 
 
 def _signal(file: Any, name: str, rate_hz: float) -> Signal:
+    """A signal, converted to SI: samples times factor plus offset of each channel's unit. Raises ValueError."""
     samples = float_dataset(file, name, "(samples, channels)")
     quantity, unit, channels = (texts_attribute(file[name], key) for key in ("quantity", "unit", "channels"))
-    channels = _one_each(channels, samples.shape[1])
+    channels = _split_channel_names(channels, samples.shape[1])
     try:
         signal = Signal(samples, rate_hz, text_or_list(quantity), text_or_list(unit), channels)
     except ValueError as error:
@@ -123,7 +125,7 @@ def _signal(file: Any, name: str, rate_hz: float) -> Signal:
     return Signal(samples * np.array(scale) + np.array(offset), rate_hz, signal.quantity, tuple(si), channels)
 
 
-def _one_each(channels: tuple[str, ...], columns: int) -> tuple[str, ...]:
+def _split_channel_names(channels: tuple[str, ...], columns: int) -> tuple[str, ...]:
     """Channel names: one text for several columns either lists them, or is a common name that is numbered."""
     if len(channels) != 1 or columns < 2:
         return channels
@@ -185,10 +187,9 @@ def _meta(file: Any) -> dict[str, Any]:
 
 def _write_signal(file: Any, name: str, signal: Signal, precision: str) -> None:
     samples = signal.samples.astype(precision)
-    # Short recordings, of which a session has thousands, are not compressed: they are written faster.
-    packed = {"compression": "gzip", "shuffle": True} if samples.nbytes > _PACK_ABOVE_BYTES else {}
+    compression = {"compression": "gzip", "shuffle": True} if samples.nbytes > _COMPRESS_ABOVE_BYTES else {}
     # The checksum detects samples that were changed on the disk.
-    dataset = file.create_dataset(name, data=samples, fletcher32=True, **packed)
+    dataset = file.create_dataset(name, data=samples, fletcher32=True, **compression)
     write_texts(dataset, "quantity", signal.quantity)
     write_texts(dataset, "unit", signal.unit)
     write_texts(dataset, "channels", signal.channels)

@@ -20,7 +20,7 @@ def read_summary(folder: Path) -> dict[str, Any] | None:
     return summary
 
 
-def closed_and_presentations(summary: dict[str, Any] | None) -> tuple[bool, int]:
+def read_closed_and_presentations(summary: dict[str, Any] | None) -> tuple[bool, int]:
     """Whether the session was closed when the summary was written, and the number of presentations in its log."""
     if summary is None:
         return False, 0

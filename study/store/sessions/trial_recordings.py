@@ -53,8 +53,8 @@ def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecordi
     Raises StudyError if it cannot be read.
     """
     stem = Path(name).stem
-    ours = [path for path in folder.recordings.glob(f"{stem}_*.h5") if path.stem.rpartition("_")[2].isdigit()]
-    numbered = sorted(ours, key=lambda path: int(path.stem.rpartition("_")[2]))
+    of_trial = [path for path in folder.recordings.glob(f"{stem}_*.h5") if path.stem.rpartition("_")[2].isdigit()]
+    numbered = sorted(of_trial, key=lambda path: int(path.stem.rpartition("_")[2]))
     path = [folder.path / name, *numbered][-1]
     if not path.exists():
         return None

@@ -82,7 +82,7 @@ def read_begun(folder: SessionFolder) -> SessionParticipant | None:
     return _parse_begun(read_tombstone(folder).get("begun"))
 
 
-def remaining_entries(folder: SessionFolder) -> tuple[str, ...]:
+def list_remaining(folder: SessionFolder) -> tuple[str, ...]:
     """What remains in the folder of a withdrawn session; folders end in a slash. Never raises."""
     try:
         with open_folder(folder.path) as place:
@@ -93,8 +93,9 @@ def remaining_entries(folder: SessionFolder) -> tuple[str, ...]:
 
 
 def how_to_finish(folder: SessionFolder) -> str:
-    """Empty if a withdrawal is complete; otherwise what remains, and the command that continues."""
-    left = remaining_entries(folder)
+    """Sentence on what remains of an incomplete withdrawal, and the command that continues it; empty if it is
+    complete."""
+    left = list_remaining(folder)
     if not left and folder.tombstone.exists() and not folder.withdrawal.exists():
         return ""
     still = f"Still there: {', '.join(left)}. " if left else ""

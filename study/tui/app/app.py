@@ -93,7 +93,7 @@ class HapteqApp(App[None]):
         return self._engine.pid
 
     def close_engine(self) -> None:
-        """After `run`: wait until the device has released the force and the log is closed."""
+        """Wait until the device has released the force and the log is closed. Called after `run`."""
         self._watching.end()
         self._engine.close()
         if self._sitting is not None:
@@ -101,7 +101,7 @@ class HapteqApp(App[None]):
 
     @property
     def _words(self) -> Words:
-        """Of the participant who sits here."""
+        """Texts in the language of the participant of this sitting."""
         return ENGLISH_WORDS if self._sitting is None else self._sitting.words
 
     async def _begin_sitting(self, first: Begin | Resume) -> None:
@@ -171,7 +171,7 @@ class HapteqApp(App[None]):
 
     def _unheard(self, panel: OutcomeScreen) -> None:
         if self._letting_go is panel:
-            panel.tell(outcomes.stop_unanswered_panel(self._words))
+            panel.show_outcome(outcomes.stop_unanswered_panel(self._words))
             self.bell()
 
     async def action_quit(self) -> None:

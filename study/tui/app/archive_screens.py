@@ -100,7 +100,7 @@ class ArchiveScreens:
             self._app.pop_screen()
 
     def end_calibrating(self) -> None:
-        """After an error."""
+        """Let the calibration begin again after an error."""
         if (screen := self._sensor_screen()) is not None:
             screen.begin_again()
 

@@ -15,8 +15,8 @@ def stop_told_panel(words: Words) -> Outcome:
 
 def stop_unanswered_panel(words: Words) -> Outcome:
     """Panel after the engine did not answer a stop in time."""
-    told = words.fill("stop_unheard", {"seconds": f"{UNHEARD_AFTER_S:g}"})
-    texts = (told, words["stop_safe"], words["stop_do_now"])
+    unheard = words.fill("stop_unheard", {"seconds": f"{UNHEARD_AFTER_S:g}"})
+    texts = (unheard, words["stop_safe"], words["stop_do_now"])
     return Outcome(words["stop_unheard_title"], tuple(("", text) for text in texts), ("quit",), words=words)
 
 

@@ -20,16 +20,16 @@ def start_child(
     screen. It uses this process's import path. It sees the end of the pipe when this process ends for any reason.
     Raises OSError where the system refuses.
     """
-    ours, theirs = socket.socketpair()
-    with theirs:
-        call = f"{function}({', '.join(map(repr, (theirs.fileno(), *arguments)))})"
+    own_end, child_end = socket.socketpair()
+    with child_end:
+        call = f"{function}({', '.join(map(repr, (child_end.fileno(), *arguments)))})"
         program = f"import sys; sys.path[:] = {sys.path!r}; from {module} import {function}; {call}"
         process = subprocess.Popen(
             [sys.executable, "-c", program],
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
-            pass_fds=(theirs.fileno(),),
+            pass_fds=(child_end.fileno(),),
             start_new_session=True,
         )
-    return Connection(ours.detach()), process
+    return Connection(own_end.detach()), process

@@ -33,7 +33,7 @@ from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.04
 """Interval of the signs of life; the port allows 100 ms."""
-LOOK_EVERY_S = 0.1
+POLL_EVERY_S = 0.1
 """Interval at which a wait looks for requests (s)."""
 UNSHOWN_S = 1.0
 """A shorter wait for the handle is not shown."""
@@ -109,7 +109,7 @@ class RemoteDisplay:
                 return cut
             if self._silent():
                 return self._cut_short(number, silent(self._late_s, self._load()))
-            if self._clock.now_s() - looked_s >= LOOK_EVERY_S:
+            if self._clock.now_s() - looked_s >= POLL_EVERY_S:
                 view, looked_s = look(), self._clock.now_s()
                 if number:
                     self._link.send(LookUpdate(number, view))

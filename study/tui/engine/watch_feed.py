@@ -8,7 +8,7 @@ from multiprocessing.connection import Connection
 from study.session.watching.watch_view import WatchView
 from study.tui.engine.child_process import start_child
 
-LOOK_EVERY_S = 0.2
+POLL_EVERY_S = 0.2
 """Interval at which the log is read (s)."""
 CLOSING_S = 2.0
 """Longest wait for the child process to end (s)."""
@@ -79,7 +79,7 @@ def feed(descriptor: int, session_path: str) -> None:
     connection = Connection(descriptor)
     clock, follower = RealClock(), follow(Path(session_path))
     # Anything that can be read here means the end: a word to close, or a parent that is gone.
-    while not connection.poll(LOOK_EVERY_S):
+    while not connection.poll(POLL_EVERY_S):
         try:
             view = follower.look(clock.utc())
         except StudyError as error:

@@ -11,12 +11,12 @@ from textual.screen import Screen
 from textual.widgets import Footer, ProgressBar, Static
 
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.screens.preparing import TICK_S, elapsed_words
+from study.tui.screens.preparing import TICK_S, describe_elapsed
 
 HELP = """\
 # Diagnosing
 
-The recordings are compared with the model; its own numbers are re-tuned; each effect of the catalogue that the data
+The recordings are compared with the model; its own parameters are re-tuned; each effect of the catalogue that the data
 suggest is fitted, and compared with its rivals on data that no fit has seen.
 
 **Esc** stops it. Nothing is written before the end, so nothing half done is left.
@@ -51,7 +51,7 @@ class DiagnosingScreen(Screen[bool]):
             box.border_title = "Diagnosing"
             yield Static(self._what, id="what", markup=False)
             yield ProgressBar(total=1.0, show_eta=False)
-            yield Static(elapsed_words(0.0), id="elapsed", markup=False)
+            yield Static(describe_elapsed(0.0), id="elapsed", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
@@ -67,4 +67,4 @@ class DiagnosingScreen(Screen[bool]):
         dismiss_screen(self, True)
 
     def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(elapsed_words(self._now_s() - self._began_s))
+        self.query_one("#elapsed", Static).update(describe_elapsed(self._now_s() - self._began_s))

@@ -16,8 +16,8 @@ MOST_CHARACTERS = 500
 
 
 class NotePrompt(ModalScreen[str | None]):
-    """A line for a note of the experimenter: Enter writes it, Esc leaves, F8 stops the session. Returns the text; None
-    if nothing is to be noted."""
+    """Entry of one line for a note of the experimenter: Enter writes it, Esc leaves, F8 stops the session. Returns the
+    text; None where it is empty or was left."""
 
     CSS = """
     NotePrompt { align: center bottom; }
@@ -32,6 +32,7 @@ class NotePrompt(ModalScreen[str | None]):
     ]
 
     def __init__(self, adverse: bool, stop: Callable[[], None]) -> None:
+        """adverse: whether an adverse event is noted. stop: stops the session."""
         super().__init__()
         self._adverse = adverse
         self._stop = stop

@@ -89,9 +89,9 @@ class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self.tell(self._outcome)
+        self.show_outcome(self._outcome)
 
-    def tell(self, outcome: Outcome) -> None:
+    def show_outcome(self, outcome: Outcome) -> None:
         """Replace the content when more is known."""
         self._outcome, self.words = outcome, outcome.words
         if not self.query("#told"):

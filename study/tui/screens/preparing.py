@@ -73,10 +73,10 @@ class PreparingScreen(TranslatedScreen[None]):
         self.query_one("#elapsed", Static).update(self._wait_words())
 
     def _wait_words(self) -> str:
-        return elapsed_words(self._now_s() - self._began_s, self.words) if self._sentence else ""
+        return describe_elapsed(self._now_s() - self._began_s, self.words) if self._sentence else ""
 
 
-def elapsed_words(seconds: float, words: Words = ENGLISH_WORDS) -> str:
+def describe_elapsed(seconds: float, words: Words = ENGLISH_WORDS) -> str:
     """Elapsed time in words."""
     minutes, left = divmod(int(seconds), 60)
     return words.fill("elapsed_min" if minutes else "elapsed_s", {"minutes": minutes, "seconds": left})

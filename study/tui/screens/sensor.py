@@ -98,7 +98,7 @@ class SensorScreen(Screen[None]):
                 self._show_line(f"Written into {file}. `hapteq doctor` checks the sensor. Esc goes back.")
 
     def begin_again(self) -> None:
-        """After an error, which a panel above says."""
+        """Reset the screen after an error, which a panel above it shows."""
         self._waits_for, self._under_way, self._table = None, False, ""
         self._show_line("F5 begins again.")
         self.query_one("#seen", Static).update("")

@@ -48,7 +48,7 @@ BAR_CELLS = 6
 """Characters of a bar."""
 
 
-def standing_line(view: WatchView) -> Content:
+def describe_standing(view: WatchView) -> Content:
     """Status of the session, its name, and what happens at the moment."""
     standing = f"{SYMBOLS[view.standing]} {view.standing.upper()}"
     return Content.assemble(

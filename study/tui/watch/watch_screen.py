@@ -24,14 +24,14 @@ from study.tui.screens.note_prompt import NotePrompt
 from study.tui.screens.watch_help import GUIDE, HELP
 from study.tui.screens.watch_style import STYLE
 from study.tui.watch.level_history import LevelHistory
-from study.tui.watch.watch_panels import alarm_lines, details, gauges, runs_lines, standing_line, trials_lines
+from study.tui.watch.watch_panels import alarm_lines, describe_standing, details, gauges, runs_lines, trials_lines
 from study.tui.watch.watch_source import WatchSource
 from study.tui.watch.watch_words import staircase_title
 
 RING_EVERY_S = 4.0
-"""Interval at which the bell repeats while an urgent alarm was not seen (s)."""
+"""Interval at which the bell repeats while an urgent alarm is not acknowledged (s)."""
 FORGOTTEN_AFTER_S = 10.0
-"""An alarm that returns within this time is the same one; later it is new."""
+"""An alarm that returns within this time (s) is the same one; later it is new."""
 
 Key = tuple[str, str]
 """An alarm's kind and when it began."""
@@ -43,8 +43,9 @@ class AlarmBook:
     def __init__(self) -> None:
         self._alarms: tuple[Alarm, ...] = ()
         self._seen: dict[Key, float] = {}
-        """Acknowledged, and when it was last there."""
+        """Acknowledged alarms, and when each was last present (s)."""
         self._rung: dict[Key, float] = {}
+        """Alarms for which the bell has rung, and when each was last present (s)."""
         self._rang_s = float("-inf")
 
     @property
@@ -84,10 +85,10 @@ def _key(alarm: Alarm) -> Key:
     return alarm.kind, alarm.since if alarm.event else ""
 
 
-LOOK_EVERY_S = 0.1
-"""Interval at which the session's files are looked at (s)."""
+POLL_EVERY_S = 0.1
+"""Interval at which the session's files are read (s)."""
 UNHEARD_AFTER_S = 2.0
-"""A session checks for requests twenty times a second."""
+"""Time (s) after which a stop without effect is an alarm; a session checks for requests twenty times a second."""
 NO_NEWS_AFTER_S = 3.0
 """Time without a new view (s) after which the screen says that it is old."""
 SAID_FOR_S = 8.0
@@ -161,10 +162,10 @@ class WatchScreen(Screen[None]):
         titles = {"#trials": "Last trials", "#runs": "Runs", "#gauges": "Exposure and device", "#aside": "Details"}
         for name, title in titles.items():
             self.query_one(name).border_title = title
-        self.set_interval(LOOK_EVERY_S, self.look)
-        self.look()
+        self.set_interval(POLL_EVERY_S, self.poll)
+        self.poll()
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Ten times a second: check for a new view, the bell, and whether a stop was received."""
         view = self._source.latest()
         if view is not None and view is not self._taken:
@@ -182,7 +183,7 @@ class WatchScreen(Screen[None]):
         if view is None:
             return
         self._redraw()
-        self.query_one("#standing", Static).update(standing_line(view))
+        self.query_one("#standing", Static).update(describe_standing(view))
         self.query_one("#levels").border_title = staircase_title(view)
         self.query_one(LevelHistory).show(view.points, view.next_level_n, view.cap_n)
         self.query_one("#details", Static).update(details(view))

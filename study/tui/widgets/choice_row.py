@@ -62,7 +62,7 @@ class ChoiceRow(Widget, can_focus=True):
 
     @property
     def answer(self) -> str:
-        """Empty where nothing is chosen."""
+        """The chosen answer; empty where nothing is chosen."""
         return "" if self.chosen is None else self._choices[self.chosen]
 
     def on_key(self, event: Key) -> None:

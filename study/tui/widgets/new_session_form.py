@@ -77,13 +77,13 @@ class NewSessionForm(Vertical):
         if self._home is None or self.query_one("#begin", Button).disabled:
             return
         code = self._code
-        problem = code_problem(code) or self._standing_problem(code)
+        problem = code_problem(code) or self._find_standing_problem(code)
         if problem or self._model_problem:
             self._show_about(problem or self._model_problem, "-problem")
             self.query_one("#code" if problem else "#protocol").focus()
             return
-        model = self._selected_value("#model") if self._equalized else ""
-        self.post_message(BeginWanted(code, self._selected_value("#protocol"), self._selected_value("#device"), model))
+        model = self._read_selected("#model") if self._equalized else ""
+        self.post_message(BeginWanted(code, self._read_selected("#protocol"), self._read_selected("#device"), model))
 
     @on(Input.Changed, "#code")
     @on(Select.Changed)
@@ -94,24 +94,24 @@ class NewSessionForm(Vertical):
         self.set_class(self._equalized, "-equalized")
         if code and not is_code(code):
             self._show_about(code_problem(code), "-problem")
-        elif problem := self._standing_problem(code):
+        elif problem := self._find_standing_problem(code):
             self._show_about(problem, "-problem")
         elif self._model_problem:
             self._show_about(self._model_problem, "-problem")
         elif notice := self._notice(code):
             self._show_about(notice, "-notice")
         else:
-            protocol = self._selected_value("#protocol")
+            protocol = self._read_selected("#protocol")
             self._show_about(next((p.title for p in self._home.protocols if p.name == protocol), ""), "")
 
     @property
     def _equalized(self) -> bool:
-        chosen = self._selected_value("#protocol")
+        chosen = self._read_selected("#protocol")
         return self._home is not None and any(p.equalized for p in self._home.protocols if p.name == chosen)
 
     @property
     def _model_problem(self) -> str:
-        if not self._equalized or self._selected_value("#model"):
+        if not self._equalized or self._read_selected("#model"):
             return ""
         return "This protocol needs a model beside the data: hapteq record, hapteq identify."
 
@@ -119,13 +119,13 @@ class NewSessionForm(Vertical):
     def _code(self) -> str:
         return self.query_one("#code", Input).value.strip()
 
-    def _standing_problem(self, code: str) -> str:
+    def _find_standing_problem(self, code: str) -> str:
         """What the list already says against a code; the program that begins a session checks again."""
         return next((f"{code} withdrew: this code is not given again." for line in self._sessions(code)
                      if line.standing == "withdrawn"), "")  # fmt: skip
 
     def _notice(self, code: str) -> str:
-        lines, protocol = self._sessions(code), self._selected_value("#protocol")
+        lines, protocol = self._sessions(code), self._read_selected("#protocol")
         for line in lines:
             if line.standing == "unfinished" and line.protocol == _name(protocol, self._home):
                 return (
@@ -139,7 +139,7 @@ class NewSessionForm(Vertical):
     def _sessions(self, code: str) -> list[SessionLine]:
         return [line for line in self._home.sessions if line.subject == code] if self._home and code else []
 
-    def _selected_value(self, which: str) -> str:
+    def _read_selected(self, which: str) -> str:
         value = self.query_one(which, Select).value
         return value if isinstance(value, str) else ""
 

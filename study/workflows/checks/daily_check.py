@@ -13,7 +13,7 @@ from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.hashing import protocol_hash
 from study.devices.clock import RealClock
 from study.devices.device import Device, DeviceInfo
-from study.devices.opening import accepted_baseline, device_folder, needs_real_time, open_device
+from study.devices.opening import device_folder, find_accepted_baseline, needs_real_time, open_device
 from study.errors import DeviceError, StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.session.views.local_time import local_parts, local_time
@@ -23,7 +23,7 @@ from study.store.formats.daily_check_file import DailyCheck, read_daily_check, w
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.device_changes import change_findings
-from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
+from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on
 
 if TYPE_CHECKING:
     from analysis.device_change.compare_devices import Change
@@ -63,10 +63,11 @@ def record_baseline(name: str, moving: MotionCallbacks) -> tuple[str, str]:
     also where the recording is not good enough for a comparison."""
     plan = _plan(name, BASELINES)
     with contextlib.closing(_open_free_device(plan)) as device:
-        return _baseline_on(device, plan, moving)
+        return _record_baseline_on(device, plan, moving)
 
 
-def _baseline_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> tuple[str, str]:
+def _record_baseline_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> tuple[str, str]:
+    """As `record_baseline`, on an open device."""
     record_on(device, plan, moving.show, moving.announce)
     recorded = read_recording(plan.out)
     facts = recorded.meta["segments"]
@@ -101,7 +102,7 @@ def check_today(name: str, moving: MotionCallbacks) -> CheckedToday:
 
 def check_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> CheckedToday:
     """Carry out the check of `check_today` on an open device."""
-    baseline, digest = _accepted_recording(device.info, plan.protocol)
+    baseline, digest = _read_baseline(device.info, plan.protocol)
     begun: list[str] = []
 
     def announce(notice: str) -> None:
@@ -112,7 +113,7 @@ def check_on(device: Device, plan: RecordingPlan, moving: MotionCallbacks) -> Ch
         record_on(device, plan, moving.show, announce)
         changes = compare_recordings(baseline, read_recording(plan.out))
     except BaseException as error:
-        if begun:  # an earlier pass of the same day must not remain valid
+        if begun:  # A check that was passed earlier on the same day must not remain valid.
             with contextlib.suppress(StudyError, OSError):
                 why = str(error) or type(error).__name__
                 _write_check(device.info, plan, digest, False, (f"It broke off: {why}",), ())
@@ -148,8 +149,8 @@ def _write_check(
 
 
 def compare_recordings(baseline: Recording, today: Recording) -> tuple["Change", ...]:
-    """Changes between the accepted recording and today's. Raises DeviceError where one of them does not tell what is
-    compared."""
+    """Changes of friction, gain, response and noise between the accepted recording and today's. Raises DeviceError
+    where one of the recordings does not allow to measure them."""
     # Imported here: every sitting reads the last check, but only a check needs the comparison, which is slow to import.
     from analysis.device_change.compare_devices import compare_devices
     from analysis.device_change.measure_device import NotMeasurableError
@@ -165,14 +166,15 @@ def last_check(info: DeviceInfo, needed: bool = False) -> DeviceFinding:
 
     needed: as the protocol asks; then it is a DeviceError.
     """
-    found = _found_check(info)
+    found = _find_last_check(info)
     if needed and not found.fine:
         title = "The sitting did not begin: its protocol asks for a daily check that was passed"
         raise DeviceError(title, f"Daily check: {found.value}.", found.advice)
     return found
 
 
-def _found_check(info: DeviceInfo) -> DeviceFinding:
+def _find_last_check(info: DeviceInfo) -> DeviceFinding:
+    """The newest check of this device as a finding; unreadable files are passed over."""
     day = local_parts(datetime.now(UTC).isoformat(), machine_zone)[0]
     option = info.name.replace(".", "")
     advice = f"With no hand on the handle: hapteq doctor --device {option} --daily."
@@ -186,7 +188,7 @@ def _found_check(info: DeviceInfo) -> DeviceFinding:
         when = f"{local_time(check.utc, machine_zone)}, {path}"
         if local_parts(check.utc, machine_zone)[0] != day:
             return DeviceFinding("Daily check", f"none today; the last one was {when}", False, advice, warning=True)
-        if check.baseline_sha256 != _accepted_digest(info):
+        if check.baseline_sha256 != _digest_of_baseline(info):
             text = f"none since it was accepted anew; the last one was {when}"
             return DeviceFinding("Daily check", text, False, advice, warning=True)
         if not check.changes:
@@ -199,16 +201,18 @@ def _found_check(info: DeviceInfo) -> DeviceFinding:
     return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
 
 
-def _accepted_digest(info: DeviceInfo) -> str:
-    """Empty where this device is not accepted now."""
+def _digest_of_baseline(info: DeviceInfo) -> str:
+    """SHA-256 of the baseline of this device's acceptance; empty where it is not accepted now."""
     try:
-        return accepted_baseline(info, datetime.now(UTC).date())[1]
+        return find_accepted_baseline(info, datetime.now(UTC).date())[1]
     except DeviceError:
         return ""
 
 
-def _accepted_recording(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recording, str]:
-    name, digest = accepted_baseline(info, datetime.now(UTC).date())
+def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recording, str]:
+    """The recording of this device's acceptance, and its SHA-256. Raises DeviceError where there is none, or it is not
+    comparable with a recording by this protocol."""
+    name, digest = find_accepted_baseline(info, datetime.now(UTC).date())
     again = f"Accept it anew: hapteq doctor --device {info.name.replace('.', '')} --timing 60 --accept 'NAME'."
     if not name:
         raise DeviceError(
@@ -245,9 +249,10 @@ def _time_stamp() -> str:
 
 
 def _open_free_device(plan: RecordingPlan) -> Device:
-    return open_device(plan.device, recording_settings(plan), RealClock(), plan.seed)
+    return open_device(plan.device, make_recording_settings(plan), RealClock(), plan.seed)
 
 
 def _as_json(change: "Change") -> dict[str, Any]:
-    numbers = {name: None for name in ("accepted", "today", "error") if math.isnan(getattr(change, name))}
-    return asdict(change) | numbers
+    # JSON has no NaN.
+    unknown = {name: None for name in ("accepted", "today", "error") if math.isnan(getattr(change, name))}
+    return asdict(change) | unknown

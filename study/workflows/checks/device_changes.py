@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from analysis.wording import signed_number
+from analysis.wording import format_signed
 from study.session.views.views import DeviceFinding
 
 if TYPE_CHECKING:
@@ -28,15 +28,18 @@ IF_IT_STAYS = "If it stays, name the cause with `hapteq diagnose`, or accept the
 def change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ...]:
     """One for each kind, in the order in which they come."""
     kinds = dict.fromkeys(change.kind for change in changes)
-    rubs = any(change.changed for change in changes if change.kind == "friction")
-    return tuple(_finding(kind, [change for change in changes if change.kind == kind], rubs) for kind in kinds)
+    friction_changed = any(change.changed for change in changes if change.kind == "friction")
+    return tuple(
+        _finding(kind, [change for change in changes if change.kind == kind], friction_changed) for kind in kinds
+    )
 
 
-def _finding(kind: str, changes: Sequence["Change"], rubs: bool) -> DeviceFinding:
-    """rubs: whether the friction changed, which also changes gain and response."""
+def _finding(kind: str, changes: Sequence["Change"], friction_changed: bool) -> DeviceFinding:
+    """The line on one kind of change. friction_changed: whether the friction changed, too, which also changes gain and
+    response."""
     value = f"{'; '.join(_change_text(change) for change in changes)} ({_limit_words(changes[0])})"
     axes = ", ".join(change.axis for change in changes if change.changed)
-    causes = FRICTION_FIRST if rubs and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"
+    causes = FRICTION_FIRST if friction_changed and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"
     advice = f"It changed ({axes}). {causes}"
     if axes:
         return DeviceFinding(kind.capitalize(), value, fine=False, advice=advice)
@@ -48,7 +51,7 @@ def _finding(kind: str, changes: Sequence["Change"], rubs: bool) -> DeviceFindin
 def _change_text(change: "Change") -> str:
     match change.kind:
         case "gain":
-            return f"{change.axis} {signed_number(100 * (change.today - 1), 1)} %"
+            return f"{change.axis} {format_signed(100 * (change.today - 1), 1)} %"
         case "response" if math.isnan(change.today):
             return f"{change.axis} not measured{_place_words(change)}"
         case "response":

@@ -55,7 +55,7 @@ def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
 
 
 def _drifts(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
-    """What changed from probe to probe, in one remark."""
+    """One remark on the changes of the device from probe to probe, also where there are none."""
     watched = begin_watching(folded.state.opened, folded.state.protocol)
     for event in folded.contents.events[1:]:
         watched = follow(watched, event)

@@ -26,7 +26,7 @@ class BandOfStudy:
     """A frequency band that ends at the direction limit found by a study."""
 
     band_hz: tuple[float, float]
-    told: str
+    origin: str
     """Where the upper end comes from, in a sentence."""
 
 
@@ -59,7 +59,7 @@ def band_of_study(path: Path, lowest_hz: float) -> BandOfStudy:
 
 
 def _number(document: dict[str, Any], key: str) -> float | None:
-    """Of the direction limit; None where it is not given."""
+    """A positive value of the direction limit in the document; None where it is not given."""
     primary = document.get("primary")
     limit = primary.get("limit") if isinstance(primary, dict) else None
     value = limit.get(key) if isinstance(limit, dict) else None

@@ -12,7 +12,7 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.tracking.bands.narrow_and_wide_models import BandFacts, banded_feedforward
+from equalizer.tracking.bands.narrow_and_wide_models import BandFacts, solve_banded_feedforward
 from equalizer.tracking.compensation.effect_compensation import Compensation, compensate
 from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
@@ -166,7 +166,7 @@ def _solve(plan: EqualizePlan, wanted: Trajectory, models: PlaybackModels) -> tu
     settings = FeedforwardSettings(plan.weight, plan.cap_n, plan.constrain)
     if models.two is None:
         return feedforward_at(models.at, wanted.signal, settings), None
-    banded = banded_feedforward(models.two, wanted.signal, settings)
+    banded = solve_banded_feedforward(models.two, wanted.signal, settings)
     return banded.feedforward, banded.facts
 
 

@@ -7,7 +7,7 @@ from study.workflows.equalizer.identify_model import IdentifiedDevice
 
 
 def summary(device: IdentifiedDevice) -> dict[str, Any]:
-    """The figures, for a person's lines and a program's JSON alike."""
+    """Quality, order, band and errors of the identified model as JSON values; errors are relative to the response."""
     model, tested = device.model, device.tested
     low, high = model.band_hz
     return {

@@ -34,11 +34,11 @@ from study.store.disk.new_folder import new_folder, require_new_folder
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.play_forces import (
-    acting_spring,
     announce_motion,
-    measured_acceleration,
+    find_acting_spring,
     play_forces,
     playback_settings,
+    read_measured_acceleration,
     require_device_alone,
 )
 from study.workflows.equalizer.playback_models import PlaybackModels, Vector, read_playback_models
@@ -103,7 +103,7 @@ class ContactPlay:
 def play_contact(
     plan: ContactPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving = refuse_unannounced
 ) -> ContactPlay:
-    """Reads, solves, plays and writes. on_progress: told the share that is played. before_moving: see
+    """Reads, solves, plays and writes. on_progress: called with the share played. before_moving: see
     `BeforeMoving`. Raises StudyError, before anything moves for what cannot be played; nothing is written then."""
     require_new_folder(plan.out)
     normal = _unit(plan.normal)
@@ -161,8 +161,8 @@ def _along_normal(recording: FloatArray, normal: FloatArray, rows: int) -> Float
 
 def _beside_spring(forces: FloatArray, wanted: FloatArray, models: PlaybackModels) -> FloatArray:
     """Commands less the force of the spring along the wanted motion."""
-    commands = compensate_spring(lambda _: forces, acting_spring(models), models.nearest.sample_rate_hz, models.band_hz)
-    return commands(wanted)
+    spring, rate_hz = find_acting_spring(models), models.nearest.sample_rate_hz
+    return compensate_spring(lambda _: forces, spring, rate_hz, models.band_hz)(wanted)
 
 
 def _fade_out(forces: FloatArray, rate_hz: float) -> FloatArray:
@@ -234,7 +234,7 @@ def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[floa
     """(N, 3), m/s^2, of the rows of the forces."""
     settle = round(SETTLE_S * device.info.sample_rate_hz)
     padded = np.pad(forces, ((settle, settle), (0, 0)))
-    return measured_acceleration(play_forces(device, padded, on_share))[settle : settle + len(forces)]
+    return read_measured_acceleration(play_forces(device, padded, on_share))[settle : settle + len(forces)]
 
 
 def _write(done: ContactPlay, models: PlaybackModels) -> None:

@@ -32,7 +32,7 @@ def require_device_alone(models: PlaybackModels) -> None:
         )
 
 
-def acting_spring(models: PlaybackModels) -> VirtualSpring:
+def find_acting_spring(models: PlaybackModels) -> VirtualSpring:
     """The spring that adds to the commands and is not in the model. Raises StudyError where it is not known."""
     feedback = _feedback(models)
     acting = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
@@ -85,7 +85,7 @@ def play_forces(device: Device, forces: FloatArray, on_progress: Callable[[float
     return device.play(commands, on_progress)
 
 
-def measured_acceleration(played: Played) -> FloatArray:
+def read_measured_acceleration(played: Played) -> FloatArray:
     """(N, 3), m/s²: the accelerometer's rows. Raises DeviceError where they do not follow the forces."""
     health = played.health
     if played.recording is None or health.fault is not Fault.NONE:

@@ -13,7 +13,7 @@ from equalizer.plant.model_quality import ModelQuality, worst_quality
 from equalizer.plant.model_response import model_response
 from equalizer.tracking.bands.narrow_and_wide_models import TwoModels
 from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY
-from equalizer.tracking.workspace.feedforward_at_place import used_models
+from equalizer.tracking.workspace.feedforward_at_place import select_used_models
 from equalizer.tracking.workspace.interpolation_choice import InterpolationChoice, PlaceCheck, choose_interpolation
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 from equalizer.tracking.workspace.place_weights import place_weights
@@ -68,7 +68,7 @@ class PlaybackModels:
     @property
     def band_hz(self) -> tuple[float, float]:
         """Band for which an error is predicted: common to all models used."""
-        return used_models(self.at)[0][1].band_hz
+        return select_used_models(self.at)[0][1].band_hz
 
     @property
     def largest(self) -> IdentifiedModel:

@@ -21,8 +21,8 @@ from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.formats.repeats_file import repeats_path
 from study.workflows.equalizer.play_forces import (
     announce_motion,
-    measured_acceleration,
     play_forces,
+    read_measured_acceleration,
 )
 from study.workflows.equalizer.repeat_results import Repeated, RepeatPlan, make_result, write_repeated
 
@@ -94,14 +94,14 @@ def _play_all(
     on_progress: OnProgress,
 ) -> None:
     begun = _start_iteration(plan, device)
-    silence = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
-    rest = measured_acceleration(play_forces(device, silence, lambda _: None))
+    zeros_n = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
+    rest = read_measured_acceleration(play_forces(device, zeros_n, lambda _: None))
     repetition = replace(begun.repetition, noise_floor=noise_of_rest(rest, begun.repetition))
     states.append(replace(begun, repetition=repetition, noise_floor=repetition.noise_floor))
     while states[-1].verdict is Verdict.CONTINUE and len(played) <= plan.repeats:
         number = len(played)
         last = play_forces(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
-        measured = measured_acceleration(last)
+        measured = read_measured_acceleration(last)
         played.append(last)
         states.append(next_forces(states[-1], measured))
 

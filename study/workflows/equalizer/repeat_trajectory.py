@@ -25,7 +25,7 @@ from study.workflows.equalizer.equalize_trajectory import (
 )
 from study.workflows.equalizer.equalized_summary import summary, summary_lines
 from study.workflows.equalizer.play_forces import (
-    acting_spring,
+    find_acting_spring,
     playback_settings,
     require_device_alone,
 )
@@ -72,7 +72,7 @@ def repeat_trajectory(
             "The forces are at the cap already, so that there is no room to correct them.",
             "Scale the accelerations, or leave out --constrain or --repeat.",
         )
-    spring = acting_spring(solved.models)
+    spring = find_acting_spring(solved.models)
     tested = convergence_at(solved.models.at, plan.weight, spring)
     gain = _gain(tested)
     repeat_plan = RepeatPlan(

@@ -35,7 +35,7 @@ from study.store.formats.calibration_file import ABOUT as CALIBRATION_ABOUT
 from study.store.formats.calibration_file import LAYOUT as CALIBRATION_LAYOUT
 from study.store.sessions import live_file, log_seal
 from study.store.sessions.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
-from study.workflows.files.importing_docs import importing_markdown
+from study.workflows.files.importing_docs import write_importing_page
 
 
 def event_schema() -> dict[str, Any]:
@@ -206,7 +206,7 @@ def formats_markdown() -> str:
 def documents() -> dict[str, str]:
     """Every generated file: its path under docs, and its text."""
     schemas = {f"schemas/{schema.file}": json.dumps(schema.make(), indent=2) + "\n" for schema in SCHEMAS}
-    return {"formats.md": formats_markdown(), "importing.md": importing_markdown(), **schemas}
+    return {"formats.md": formats_markdown(), "importing.md": write_importing_page(), **schemas}
 
 
 def write_documents(folder: Path) -> None:

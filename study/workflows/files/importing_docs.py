@@ -6,7 +6,14 @@ from equalizer.signals.resampling import FLAT_TO
 from equalizer.signals.units import ALLOWED
 from protocols.document.schema import Node, resolve_reference
 from study.importing.arrays.csv_arrays import MOST_ROWS
-from study.importing.expressions.budget import DEEPEST, LARGEST, NUMBERS, WORK
+from study.importing.expressions.budget import (
+    COMPUTED,
+    COMPUTED_PER_NUMBER,
+    DEEPEST,
+    HELD,
+    HELD_PER_NUMBER,
+    MOST_HELD,
+)
 from study.importing.expressions.functions import FUNCTIONS
 from study.importing.map_format.map_toml import MAP_SCHEMA, describe_allowed_in_map
 from study.importing.map_library import list_shipped_maps, read_map
@@ -194,7 +201,7 @@ Two loggers write a table each: `drive_3.csv` with the columns `t,counts,current
 """Beginning of the page."""
 
 
-def importing_markdown() -> str:
+def write_importing_page() -> str:
     """The text of docs/importing.md."""
     parts = [
         _INTRODUCTION,
@@ -205,9 +212,9 @@ def importing_markdown() -> str:
         "is no word. A column `fx [N]` is also known as `fx`. Structures of Matlab are `array('data.u')`, datasets of "
         "HDF5 `array('run1/force')`. In computed channels `clock_s` is the reference time and `rate_hz` the rate. "
         "Nothing else is understood: an expression cannot run code.",
-        f"All expressions of an import together may hold {NUMBERS:.0e} numbers at once and 20 times as many as its "
-        f"files hold ({LARGEST:.0e} at most), compute {WORK:.0e} and 500 times as many, and nest {DEEPEST} levels "
-        "deep, definitions included; beyond that they are refused by name.",
+        f"All expressions of an import together may hold {HELD:.0e} numbers at once and {HELD_PER_NUMBER} times as "
+        f"many as its files hold ({MOST_HELD:.0e} at most), compute {COMPUTED:.0e} and {COMPUTED_PER_NUMBER} times as "
+        f"many, and nest {DEEPEST} levels deep, definitions included; beyond that they are refused by name.",
         _rows(("function", "gives"), ((f"`{f.usage}`", f.meaning) for f in FUNCTIONS.values())),
         "## What is not read",
         "Only regular files: no pipes, devices or folders. A file is held to its size on disk before any memory is "

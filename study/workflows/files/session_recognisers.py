@@ -90,7 +90,7 @@ def _check_session(folder: SessionFolder, path: Path) -> str:
     """Checks beyond the log: every recording is the logged one, and the tables agree with the log."""
     folded = _fold(folder, path)
     problems = [
-        *_recording_problems(folder, folded),
+        *_check_recording_file(folder, folded),
         *_result_problems(folder, folded),
     ]
     if problems:
@@ -111,7 +111,7 @@ def _fold(folder: SessionFolder, path: Path) -> FoldedSession:
     return folded
 
 
-def _recording_problems(folder: SessionFolder, folded: FoldedSession) -> list[str]:
+def _check_recording_file(folder: SessionFolder, folded: FoldedSession) -> list[str]:
     problems = []
     for event in folded.contents.events:
         if not isinstance(event, TrialMeasured) or event.recording is None:

@@ -10,8 +10,8 @@ from analysis.psychophysics.power.power_curve import (
     PowerPoint,
     Share,
     StudyVerdict,
+    find_judged_pair,
     judge_study,
-    judged_pair,
     power_point,
     true_difference_db,
 )
@@ -23,7 +23,7 @@ from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
 from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import read_text, write_text
-from study.workflows.run_on_executor import finished_pieces
+from study.workflows.run_on_executor import run_pieces
 
 CHUNK = 10
 """Studies per piece of work: some seconds, so that little is lost when a worker dies."""
@@ -49,7 +49,7 @@ class PowerPlan:
     @property
     def pair_hz(self) -> tuple[float, float]:
         """The two frequencies that are compared."""
-        return judged_pair(self.crowd.frequencies_hz, self.contrast_hz)
+        return find_judged_pair(self.crowd.frequencies_hz, self.contrast_hz)
 
 
 Piece = tuple[int, int]
@@ -75,7 +75,7 @@ def simulate_power(
     todo = [(n, first) for n in plan.people for first in range(0, plan.studies, CHUNK) if (n, first) not in done]
     finished = sum(map(len, done.values()))
     on_finished(finished)
-    for piece, verdicts in finished_pieces(executor, judge_piece, ((piece, (plan, piece)) for piece in todo)):
+    for piece, verdicts in run_pieces(executor, judge_piece, ((piece, (plan, piece)) for piece in todo)):
         done[piece] = verdicts
         _append(path, {"piece": piece, "verdicts": [asdict(v) for v in verdicts]})
         finished += len(verdicts)
@@ -118,7 +118,7 @@ def _plan_facts(plan: PowerPlan) -> dict[str, object]:
             del crowd[habit]
     facts = {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
     # Left out where it is the usual pair, so that a folder that was begun before there was a choice goes on.
-    usual = plan.pair_hz == judged_pair(plan.crowd.frequencies_hz, ())
+    usual = plan.pair_hz == find_judged_pair(plan.crowd.frequencies_hz, ())
     return facts if usual else {**facts, "contrast_hz": list(plan.pair_hz)}
 
 

@@ -12,8 +12,8 @@ from equalizer.linkage.calibration import (
     CalibrationError,
     LinkageCalibration,
     LinkageReading,
+    check_reading,
     difference_problems,
-    reading_problems,
 )
 from equalizer.linkage.grid import STEP_M, arm_azimuths, beside, difference_error, symmetric_grid
 from equalizer.linkage.mirror_lines import asymmetry_words, fill_in, line_asymmetry
@@ -43,9 +43,9 @@ class CalibrationPlan:
     out: Path
     device: str = "simulated"
     radius_m: float = 0.05
-    """Of the grid around the axis x."""
+    """Radius of the grid around the x axis (m)."""
     depth_m: float = 0.04
-    """Of the grid along x, before the centre and behind it."""
+    """Extent of the grid along x, in front of the centre and behind it (m)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +74,7 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
     try:
         with linkage_of(plan.device) as linkage:
             linkage.check_frame()
-            written = _read(linkage, plan, on_progress)
+            written = _read_grid(linkage, plan, on_progress)
     except CalibrationError as error:
         raise _refusal(plan.device, error.problems) from error
     except DeviceError as error:
@@ -130,7 +130,9 @@ def calibration_lines(written: WrittenCalibration) -> tuple[str, ...]:
     )
 
 
-def _read(linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
+def _read_grid(
+    linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]
+) -> WrittenCalibration:
     """The calibration over the whole grid. All readings are checked before it is refused, so that an error can list the
     problems. Raises CalibrationError, DeviceError."""
     azimuths = arm_azimuths(_centre_jacobian(linkage))
@@ -143,7 +145,7 @@ def _read(linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable
             unread.append(position)
         else:
             readings.append(reading)
-            problems += reading_problems(reading)
+            problems += check_reading(reading)
             worst = max(worst, _difference_error(linkage, reading))
         on_progress(number / len(grid))
     if problems:
@@ -171,7 +173,7 @@ def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
     centre = linkage.at(np.zeros(3))
     if centre is None:
         raise CalibrationError(("the centre of the workspace is out of its reach",))
-    problems = tuple(reading_problems(centre)) or tuple(difference_problems(_difference_error(linkage, centre)))
+    problems = tuple(check_reading(centre)) or tuple(difference_problems(_difference_error(linkage, centre)))
     if problems:
         raise CalibrationError(problems)
     return centre.jacobian
@@ -179,7 +181,7 @@ def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
 
 def _difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
     """Difference between the device's Jacobian and finite differences of its own joint angles, relative to the
-    Jacobian. 0 where a neighbour is out of reach, or where a value is no number, which `reading_problems` refuses."""
+    Jacobian. 0 where a neighbour is out of reach, or where a value is no number, which `check_reading` refuses."""
     positions = beside(reading.position_m)
     rows = [angle for position in positions if (angle := linkage.angles_at(position)) is not None]
     angles = np.array(rows)
@@ -198,8 +200,8 @@ def _refusal(name: str, problems: tuple[str, ...]) -> DeviceError:
     more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
     return DeviceError(
         TITLE,
-        f"What {name} says of its linkage cannot be: {'; '.join(problems[:SHOWN])}{more}.",
+        f"The linkage that {name} reports is inconsistent: {'; '.join(problems[:SHOWN])}{more}.",
         f"Calibrate its handle anew (`hapteq doctor --device {name} --calibrate`), try a smaller grid (--radius, "
-        "--depth) and the vendor's newest SDK; if it says the same then, do without: no other command needs it.",
+        "--depth) and the vendor's newest SDK; if the report stays the same, do without: no other command needs it.",
         saved=SAVED,
     )

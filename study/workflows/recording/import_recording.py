@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from equalizer.signals.joining import join
+from equalizer.signals.joining import join, signals_left_out
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.importing.arrays.arrays import Arrays
@@ -141,9 +141,13 @@ def _read_own(files: Sequence[Path]) -> Foreign:
     try:
         joined = join(recordings, {"parts": facts})
     except ValueError as error:
-        raise ImportRefusedError(files[0].name, str(error), "Import recordings of one device and rate.") from error
-    notes = (f"{len(files)} recordings were put one after another; time stamps were left out.",)
-    return Foreign(joined, tuple(files), "recording", "", notes)
+        raise ImportRefusedError(
+            files[0].name, str(error), "Import recordings of one device, rate and hold."
+        ) from error
+    notes = [f"{len(files)} recordings were put one after another; time stamps were left out."]
+    if missing := signals_left_out(recordings):
+        notes.append(f"Left out, because not every recording has it: {', '.join(missing)}.")
+    return Foreign(joined, tuple(files), "recording", "", tuple(notes))
 
 
 def _import_by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:

@@ -43,7 +43,7 @@ def write_look(found: Sequence[Overview], folder: Path) -> Path:
     return folder / PAGE_NAME
 
 
-def recording_facts(found: Overview) -> tuple[str, ...]:
+def list_recording_facts(found: Overview) -> tuple[str, ...]:
     """Metadata of a recording, one line each."""
     recording, meta = found.recording, found.recording.meta
     parts = len(found.stretches)
@@ -61,10 +61,10 @@ def recording_facts(found: Overview) -> tuple[str, ...]:
 
 def look_document(found: Sequence[Overview]) -> list[dict[str, Any]]:
     """One entry per recording, numbers in SI."""
-    return [_recording_entry(each) for each in found]
+    return [_describe_recording_entry(each) for each in found]
 
 
-def _recording_entry(each: Overview) -> dict[str, Any]:
+def _describe_recording_entry(each: Overview) -> dict[str, Any]:
     recording = each.recording
     return {
         "recording": each.name,

@@ -11,7 +11,7 @@ from study.errors import DeviceError
 from study.session.stimulus.recording_pieces import Piece, pieces
 
 LOWERED_TO = 0.7
-"""Factor of the amplitude: 3 dB; after five repetitions a sixth is left."""
+"""Factor of the amplitude at each repetition, 3 dB: after five, a sixth is left. By hand."""
 
 MOST_TRIES = 6
 """Attempts per piece: a sensor that clips at a sixth is broken or configured for another device."""
@@ -19,7 +19,7 @@ MOST_TRIES = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedPiece:
-    """A piece as finally played, clean unless `clipped`."""
+    """A piece as finally played: nothing was at its limit unless `clipped`."""
 
     piece: Piece
     requested_n: float
@@ -55,7 +55,7 @@ def play_pieces(
     for piece in pieces(protocol, device.info.sample_rate_hz):
         length_s, started_s = piece.commands.duration_s, before_s
         same = (piece.number, piece.frequency_hz)
-        take = _play_until_clean(
+        take = _play_until_unclipped(
             protocol,
             device,
             piece,
@@ -68,10 +68,10 @@ def play_pieces(
         on_progress(before_s)
 
 
-def _play_until_clean(
+def _play_until_unclipped(
     protocol: RecordingProtocol, device: Device, piece: Piece, share: float, on_share: Callable[[float], None]
 ) -> PlayedPiece:
-    """The first clean take, or the last one."""
+    """The first take in which nothing was at its limit, or the last one."""
     requested_n = piece.segment.amplitude
     least_n = min(protocol.least_amplitude_n, requested_n)
     amplitude_n, sensor_before, total_before = share * requested_n, 0, 0

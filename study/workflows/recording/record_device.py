@@ -67,7 +67,7 @@ def record_device(
     """
     check_free(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
-    with contextlib.closing(open_device(plan.device, recording_settings(plan), clock, plan.seed)) as device:
+    with contextlib.closing(open_device(plan.device, make_recording_settings(plan), clock, plan.seed)) as device:
         return record_on(device, plan, on_progress, before_moving)
 
 
@@ -77,8 +77,8 @@ def record_on(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
-    """Record on an open device, whose settings are `recording_settings`; as `record_device`, but `out` is not checked
-    before. Complete pieces are written even where the device fails (DeviceError)."""
+    """Record on an open device, whose settings are `make_recording_settings`; as `record_device`, but `out` is not
+    checked before. Complete pieces are written even where the device fails (DeviceError)."""
     done: list[PlayedPiece] = []
     try:
         if not device.info.simulated:
@@ -88,10 +88,10 @@ def record_on(
         _write_whole_pieces(plan, device, done)
         if device.fault() is Fault.FORCE_LEFT:  # more important to say than the interruption
             raise _force_left_error(plan, len(done)) from interruption
-        raise _interrupted_error(plan, len(done)) from interruption
+        raise _make_interrupted_error(plan, len(done)) from interruption
     except DeviceError as error:
         _write_whole_pieces(plan, device, done)
-        error.saved = _saved_words(plan, len(done))
+        error.saved = _describe_saved(plan, len(done))
         raise
     return _write(plan, device, done, interrupted=False)
 
@@ -101,23 +101,23 @@ def check_free(out: Path) -> None:
     require_free(out, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
-def _interrupted_error(plan: RecordingPlan, done: int) -> UserInterruptError:
+def _make_interrupted_error(plan: RecordingPlan, done: int) -> UserInterruptError:
     all_pieces = len(pieces(plan.protocol, NOMINAL_RATE_HZ))
     return UserInterruptError(
         "Interrupted",
         f"{done} of {all_pieces} pieces were recorded; the force was released.",
         "Record again under another name for the whole protocol.",
-        saved=_saved_words(plan, done),
+        saved=_describe_saved(plan, done),
     )
 
 
 def _force_left_error(plan: RecordingPlan, done: int) -> DeviceError:
     return DeviceError(
-        "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=_saved_words(plan, done)
+        "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=_describe_saved(plan, done)
     )
 
 
-def _saved_words(plan: RecordingPlan, done: int) -> str:
+def _describe_saved(plan: RecordingPlan, done: int) -> str:
     return f"The {done} whole pieces are in {plan.out}." if done else "Nothing was written."
 
 
@@ -126,7 +126,7 @@ def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[PlayedPi
         _write(plan, device, done, interrupted=True)
 
 
-def recording_settings(plan: RecordingPlan) -> DeviceSettings:
+def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
     """Settings with which the device is opened for this recording."""
     return DeviceSettings(
         limits=limits_of_recording(plan.protocol),

@@ -8,7 +8,7 @@ from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids, sensor_frame
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
-from analysis.reports.declared_section import declared_words
+from analysis.reports.declared_section import describe_declared
 from analysis.reports.primary_tables import interval_words, limit_words
 from analysis.reports.study_report import render_study_report
 from study.errors import StudyError
@@ -69,7 +69,7 @@ def text_table(analysis: StudyAnalysis) -> list[str]:
     """Thresholds as lines: one per frequency, with mean and number of participants."""
     lines = ["No complete test run: there is no threshold yet."]
     if any(row.complete for row in analysis.thresholds):
-        declared = declared_words(analysis.declared_result)
+        declared = describe_declared(analysis.declared_result)
         lines = [*_lines(analysis.table, "threshold"), *_primary_lines(analysis), *declared]
     if any(row.complete for row in analysis.detection):
         lines += _lines(analysis.detection_table, "felt from")

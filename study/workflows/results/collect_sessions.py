@@ -58,11 +58,11 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedT
         locked=_lock_words([state for _, state in entering]),
         finished=_finish(whole),
         parents=tuple(folder.log for folder, _ in entering),
-        forms=_filled_forms([(folder, session) for folder, session in whole if folder.name in names]),
+        forms=_collect_filled_forms([(folder, session) for folder, session in whole if folder.name in names]),
     )
 
 
-def _filled_forms(sessions: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[FilledForm, ...]:
+def _collect_filled_forms(sessions: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[FilledForm, ...]:
     """Answers to the protocol's questions, of the sessions that enter."""
     return tuple(
         FilledForm(folder.subject, folder.name, event.form, event.answers)

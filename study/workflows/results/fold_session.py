@@ -16,7 +16,7 @@ from study.session.state.state import SessionState, begin_session
 from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
 from study.store.sessions.event_log import LogContents, read_log
 from study.store.sessions.log_seal import check_seals
-from study.store.sessions.session_summary import SUMMARY_NAME, closed_and_presentations, read_summary
+from study.store.sessions.session_summary import SUMMARY_NAME, read_closed_and_presentations, read_summary
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
 def _check_end(state: SessionState, folder: SessionFolder) -> None:
     """Raise if results show that the end of the log was lost: such a log otherwise looks like an interrupted
     session."""
-    closed, presentations = closed_and_presentations(read_summary(folder.path))
+    closed, presentations = read_closed_and_presentations(read_summary(folder.path))
     if closed or presentations > len(state.trials):
         what = "a finished session" if closed else f"{presentations} presentations"
         raise StudyError(

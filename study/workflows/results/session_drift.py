@@ -111,7 +111,7 @@ def is_beyond(drift: Drift) -> bool:
 
 
 def _halves(recording: Recording) -> tuple[Recording, Recording]:
-    """Both segments of a reference at full level."""
+    """The two segments of a reference at full level, as two recordings."""
     return replace(recording, segments=recording.segments[:1]), replace(recording, segments=recording.segments[1:2])
 
 

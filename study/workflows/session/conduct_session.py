@@ -30,10 +30,10 @@ from study.workflows.session.open_session import (
 from study.workflows.session.resume_session import resume_session
 from study.workflows.session.run_session import run_session
 from study.workflows.trial.display import Display, Hand
-from study.workflows.trial.masking import opened_sound
+from study.workflows.trial.masking import open_masking_sound
 from study.workflows.trial.requests_port import ManyRequests, QueuedRequests, Requests
 from study.workflows.trial.session_supervisor import SessionSupervisor
-from study.workflows.trial.sitting import Pulse, Sitting, Sound, no_pulse, tell, tell_clock_steps
+from study.workflows.trial.sitting import Pulse, Sitting, Sound, no_pulse, notify_experimenter, report_clock_steps
 
 
 def _ignore_opened(folder: SessionFolder, device: Device) -> None:
@@ -77,7 +77,7 @@ def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -
     settings = device_settings(plan.protocol)
     with (
         _pulses(participant.clock) as pulse,
-        opened_sound(plan.protocol.masking, participant.clock, plan.observer) as sound,
+        open_masking_sound(plan.protocol.masking, participant.clock, plan.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, plan.seed)) as device,
     ):
         _check_sensor(plan.protocol, device.info)
@@ -94,7 +94,7 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
     settings = device_settings(state.protocol)
     with (
         _pulses(participant.clock) as pulse,
-        opened_sound(state.protocol.masking, participant.clock, state.opened.observer) as sound,
+        open_masking_sound(state.protocol.masking, participant.clock, state.opened.observer) as sound,
         contextlib.closing(open_device(device_name, settings, participant.clock, state.opened.seed)) as device,
     ):
         _check_sensor(state.protocol, device.info)
@@ -149,7 +149,7 @@ def _run(
         device,
         participant.clock,
         ManyRequests(participant.requests, inbox),
-        tell=lambda live: write_live(folder.path, live),
+        publish=lambda live: write_live(folder.path, live),
         buttons=protocol.trial.device_buttons,
         place_m=place_m,
     )
@@ -166,8 +166,10 @@ def _run(
         pulse=equipment.pulse,
         sound=equipment.sound,
     )
-    tell_clock_steps(opened.state.sitting.clock_steps[known_steps:], sitting)
+    report_clock_steps(opened.state.sitting.clock_steps[known_steps:], sitting)
     for name in opened.state.sitting.not_counted:
-        tell(f"{name} cannot be read: what the hand got in it is not in the vibration dose of today.", sitting)
+        notify_experimenter(
+            f"{name} cannot be read: what the hand got in it is not in the vibration dose of today.", sitting
+        )
     end = run_session(opened.state, sitting)
     return ConductedSitting(folder, equipment.device_name, end.state, end.left, end.fault, end.why, end.withdrawn)

@@ -32,7 +32,7 @@ def check_code(data: Path, subject: str, simulated: bool) -> None:
             )
 
 
-def unfinished_sessions(data: Path, subject: str, protocol: str) -> tuple[SessionFolder, ...]:
+def find_unfinished_sessions(data: Path, subject: str, protocol: str) -> tuple[SessionFolder, ...]:
     """Resumable sessions of the same participant and protocol."""
     return tuple(folder for folder in _folders(data, subject) if _can_go_on(folder, protocol))
 
@@ -78,6 +78,6 @@ def plan_sitting(
     check_code(data, plan.subject, simulated=observer is not None)
     unfinished_before = (
         f"{unfinished.name} is not finished; hapteq resume {unfinished.path} goes on with it."
-        for unfinished in unfinished_sessions(data, plan.subject, source.protocol.name)
+        for unfinished in find_unfinished_sessions(data, plan.subject, source.protocol.name)
     )
     return SittingPlan(plan, (*unfinished_before, *filter(None, [data_folder_warning(data)])))

@@ -20,7 +20,7 @@ from study.store.disk.provenance import sha256_of
 from study.store.sessions.archive import SessionFolder, session_folders
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
-from study.workflows.run_on_executor import finished_pieces
+from study.workflows.run_on_executor import run_pieces
 from study.workflows.session.conduct_session import ConductedSitting, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import create_participant
@@ -47,7 +47,7 @@ class Rehearsal:
     """Whether the protocol was locked before the rehearsal began."""
 
 
-def rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
+def make_rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
     """Participant `number` (from 0). Raises StudyError for an unknown name."""
     kind = rehearsal.observer.replace("-", "_")
     if kind in KINDS:
@@ -72,7 +72,7 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
             return
         every = ((number, (rehearsal, number)) for number in range(rehearsal.subjects))
         with worker_processes(workers) as pool:
-            for done, _ in enumerate(finished_pieces(pool, _rehearse_sitting, every), start=1):
+            for done, _ in enumerate(run_pieces(pool, _rehearse_sitting, every), start=1):
                 on_finished(done)
 
 
@@ -85,7 +85,7 @@ def _rehearse_elsewhere(rehearsal: Rehearsal, executor: Executor, on_finished: C
     for done, number in enumerate(sorted(begun), start=1):
         _rehearse_sitting(rehearsal, number)
         on_finished(done)
-    played = finished_pieces(executor, play_apart, ((each, (rehearsal, model, each)) for each in left))
+    played = run_pieces(executor, play_apart, ((each, (rehearsal, model, each)) for each in left))
     for done, (_, (session, files, why)) in enumerate(played, start=len(begun) + 1):
         make_folder(rehearsal.data, private=True)
         with new_folder(rehearsal.data / session) as part:
@@ -112,7 +112,7 @@ def subject_seed(seed: int, number: int) -> int:
 
 
 def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
-    observer = rehearsed_observer(rehearsal, number)
+    observer = make_rehearsed_observer(rehearsal, number)
     seed = subject_seed(rehearsal.seed, number)
     if any(f.withdrawn for f in session_folders(rehearsal.data) if f.subject == subject_code(number)):
         return
@@ -141,7 +141,7 @@ def play_apart(rehearsal: Rehearsal, model: Files, number: int) -> tuple[str, Fi
 
 
 def _play_new(rehearsal: Rehearsal, number: int) -> ConductedSitting:
-    observer, seed = rehearsed_observer(rehearsal, number), subject_seed(rehearsal.seed, number)
+    observer, seed = make_rehearsed_observer(rehearsal, number), subject_seed(rehearsal.seed, number)
     plan = SessionPlan(
         protocol=rehearsal.protocol,
         protocol_text=rehearsal.protocol_text,
@@ -194,7 +194,7 @@ def _check_same(rehearsal: Rehearsal) -> None:
                 "Choose another folder with --out, or the same --model to go on.",
                 saved="Nothing was changed.",
             )
-        if opened.observer != rehearsed_observer(rehearsal, number).name:
+        if opened.observer != make_rehearsed_observer(rehearsal, number).name:
             raise StudyError(
                 "This folder holds another rehearsal",
                 f"{folder.name} in {rehearsal.data} was begun with the observer {opened.observer}.",

@@ -26,7 +26,7 @@ from study.workflows.trial.demonstrate import demonstrate
 from study.workflows.trial.masking import check_masking, start_masking, stop_masking
 from study.workflows.trial.play_probe import play_probe, play_reference
 from study.workflows.trial.present_trial import present_trial
-from study.workflows.trial.sitting import Sitting, record, tell, write_notes
+from study.workflows.trial.sitting import Sitting, notify_experimenter, record, write_notes
 from study.workflows.trial.take_pause import take_pause
 
 VOID_TRIALS_IN_A_ROW = 3
@@ -191,7 +191,7 @@ def _say_busy(state: SessionState, sitting: Sitting) -> SessionState:
     """Report void trials of a busy computer at the end of a sitting, on the screen and in the log."""
     if not state.sitting.busy_voids:
         return state
-    tell(busy_sentence(state.sitting.busy_voids), sitting)
+    notify_experimenter(busy_sentence(state.sitting.busy_voids), sitting)
     return write_notes(state, sitting)
 
 

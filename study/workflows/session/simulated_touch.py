@@ -38,7 +38,8 @@ class SimulatedTouch:
         return PERIODS / stimulus.frequency_hz
 
     def feel(self, stimulus: Present, sign_of_life: SignOfLife) -> Delivered | None:
-        """What was felt, after `seconds(stimulus)`. None without a device, or where the sign of life ended it."""
+        """Play the stimulus for `seconds(stimulus)` and return the delivered acceleration. None without a device, or
+        where the sign of life ended it."""
         if self._device is None or self._directions is None:
             return None
         rate_hz = self._device.info.sample_rate_hz

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from equalizer.signals.masking_noise import masking_noise
+from equalizer.signals.masking_noise import make_masking_noise
 from study.errors import WrongUseError
 from study.store.disk.file_errors import AlreadyThereError
 from study.store.disk.wav_file import write_wav
@@ -44,7 +44,7 @@ def write_masking_noise(path: Path, plan: NoisePlan) -> None:
     if path.exists():
         raise AlreadyThereError(path)
     try:
-        samples = masking_noise(round(60 * plan.minutes), plan.low_hz, plan.high_hz, plan.seed, SAMPLE_RATE_HZ)
+        samples = make_masking_noise(round(60 * plan.minutes), plan.low_hz, plan.high_hz, plan.seed, SAMPLE_RATE_HZ)
     except ValueError as problem:
         raise WrongUseError(
             "Such noise cannot be made", f"{problem}.", "Choose other corners or minutes.", saved="Nothing was written."

@@ -84,7 +84,7 @@ class Display(Protocol):
         ...
 
     def await_return(self, reason: str) -> None:
-        """After a void trial: wait until the participant is ready."""
+        """Wait, after a void trial, until the participant is ready."""
         ...
 
     def goodbye(self, notice: Goodbye) -> None:

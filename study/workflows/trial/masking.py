@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from equalizer.signals.masking_noise import masking_noise
+from equalizer.signals.masking_noise import make_masking_noise
 from protocols.definition.preparation import MaskingSettings
 from study.devices.clock import Clock
 from study.devices.opening import masking_sound
@@ -26,13 +26,13 @@ LOOP_S = 60
 
 
 @contextlib.contextmanager
-def opened_sound(settings: MaskingSettings, clock: Clock, observer: str | None) -> Iterator[Sound | None]:
+def open_masking_sound(settings: MaskingSettings, clock: Clock, observer: str | None) -> Iterator[Sound | None]:
     """The sound output with the masking noise, not yet playing; closed at the end. None where the protocol wants none,
     or no person is there (a simulated participant, virtual time). Raises `DeviceError`, before a session is begun."""
     if not settings.play or clock.virtual or observer is not None:
         yield None
         return
-    samples = masking_noise(LOOP_S, settings.low_hz, settings.high_hz, settings.seed, SAMPLE_RATE_HZ)
+    samples = make_masking_noise(LOOP_S, settings.low_hz, settings.high_hz, settings.seed, SAMPLE_RATE_HZ)
     attenuated = np.rint(samples * 10 ** (settings.level_db / 20)).astype(np.int16)
     with contextlib.closing(masking_sound(attenuated, SAMPLE_RATE_HZ)) as sound:
         yield sound

@@ -20,7 +20,7 @@ from study.store.disk.provenance import versions
 from study.store.sessions.trial_recordings import probe_name, save_trial_recording
 from study.workflows.trial.after_trial import AfterTrial, check_end_request, cut_short, reason_to_leave
 from study.workflows.trial.present_trial import await_handle
-from study.workflows.trial.sitting import Sitting, record, release_device, tell
+from study.workflows.trial.sitting import Sitting, notify_experimenter, record, release_device
 
 LIGHTER_WITHOUT_A_HAND = 0.9
 """Largest ratio of the apparent mass after the hand let go to that just before, with the hand."""
@@ -95,7 +95,7 @@ def _test_and_play(state: SessionState, held_kg: float, sitting: Sitting) -> Aft
 
 
 def _decline(state: SessionState, why: str, sitting: Sitting) -> SessionState:
-    tell(f"No reference was played: {why}.", sitting)
+    notify_experimenter(f"No reference was played: {why}.", sitting)
     number = state.sitting.probing.played
     event = ProbeMeasured(utc=sitting.clock.utc(), number=number, vibrated_s=0.0, trouble=why)
     return record(state, event, sitting)

@@ -18,21 +18,21 @@ PLAYING = ("trial", "demo", "probe", "reference")
 
 
 class SessionSupervisor:
-    """One per sitting. `glance` is the sign of life of every wait; `resolve` tells afterwards what ended it."""
+    """One per sitting. `glance` is the sign of life of every wait; `resolve` returns afterwards what ended it."""
 
     def __init__(
         self,
         device: Device,
         clock: Clock,
         requests: Requests,
-        tell: Callable[[Live], None],
+        publish: Callable[[Live], None],
         buttons: tuple[int, ...] = (),
         place_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         self._device = device
         self._clock = clock
         self._requests = requests
-        self._tell = tell
+        self._publish = publish
         self._buttons = buttons
         self._place_m = place_m
         self._buttons_up = False
@@ -80,7 +80,7 @@ class SessionSupervisor:
                     self._notes.append(request)
 
     def resolve(self, reply: Reply) -> Reply:
-        """What actually ended the wait, where the display only knows that it ended."""
+        """The reply of a wait: what ended it, where the display only knows that it ended."""
         if self.stop_asked is not None:
             return Unanswered(f"the {self.stop_asked} stopped the session", leave=True)
         if isinstance(reply, Answered):
@@ -113,7 +113,7 @@ class SessionSupervisor:
         self._press(look, now_s)
         if due:
             self._told_s = now_s
-            self._tell(self._live_state(look))
+            self._publish(self._live_state(look))
 
     def _press(self, look: Look, now_s: float) -> None:
         down = [number for number in self._buttons if number in look.buttons]

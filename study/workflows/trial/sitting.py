@@ -24,7 +24,7 @@ class Pulse(Protocol):
 
     @property
     def line(self) -> str:
-        """Which line, in words."""
+        """Description of the output line, for the log."""
         ...
 
     @property
@@ -88,17 +88,17 @@ def record(state: SessionState, event: Event, sitting: Sitting) -> SessionState:
     event = replace(event, monotonic_s=sitting.clock.now_s())
     after = apply(state, event)
     sitting.log.append(event)
-    tell_clock_steps(after.sitting.clock_steps[len(state.sitting.clock_steps) :], sitting)
+    report_clock_steps(after.sitting.clock_steps[len(state.sitting.clock_steps) :], sitting)
     return after
 
 
-def tell_clock_steps(steps: tuple[ClockStep, ...], sitting: Sitting) -> None:
+def report_clock_steps(steps: tuple[ClockStep, ...], sitting: Sitting) -> None:
     """Tell the experimenter of each step of the wall clock, see `tell`."""
     for step in steps:
-        tell(step.sentence, sitting)
+        notify_experimenter(step.sentence, sitting)
 
 
-def tell(sentence: str, sitting: Sitting) -> None:
+def notify_experimenter(sentence: str, sitting: Sitting) -> None:
     """Tell the experimenter: on the screen now, and in the log with the next notes."""
     sitting.display.trouble(sentence)
     sitting.supervisor.note(NoteAsked("program", sentence))

@@ -45,7 +45,7 @@ class _Begun:
     """None where it is not in the log: withdrawn or damaged."""
 
 
-def planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[PlannedStudy, ...]:
+def list_planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[PlannedStudy, ...]:
     """The plans of studies in a data folder. protocol: a name or file; None = all that were begun in `data`. simulated:
     of simulated participants instead of people, who are counted apart. Raises StudyError where there is nothing to
     plan."""
@@ -182,8 +182,8 @@ def lines(study: PlannedStudy) -> list[str]:
     done, begun, out = (plan.count(each) for each in ("done", "begun", "left out"))
     size = f" of {plan.planned} planned" if plan.planned else ""
     found = [f"{plan.protocol}: {done} done{size}, {begun} begun, {out} left out"]
-    found += _titled_list("to resume", [who.code for who in plan.participants if who.progress == "begun"])
-    found += _titled_list(
+    found += _list_with_title("to resume", [who.code for who in plan.participants if who.progress == "begun"])
+    found += _list_with_title(
         "left out", [f"{who.code} ({who.why})" for who in plan.participants if who.progress == "left out"]
     )
     if plan.planned and plan.planned % plan.balanced_sizes:
@@ -202,7 +202,7 @@ def lines(study: PlannedStudy) -> list[str]:
     return [*found, *study.remarks]
 
 
-def _titled_list(title: str, codes: Sequence[str]) -> list[str]:
+def _list_with_title(title: str, codes: Sequence[str]) -> list[str]:
     return [f"{title}: {', '.join(codes)}"] if codes else []
 
 

@@ -9,7 +9,7 @@ from study.store.sessions.request_inbox import RequestInbox
 
 HEARD_WITHIN_S = 3.0
 """A session checks about twenty times a second, except while a form or notice is shown."""
-LOOK_EVERY_S = 0.02
+POLL_EVERY_S = 0.02
 """Interval at which the reply is looked for (s)."""
 
 
@@ -30,7 +30,7 @@ def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
     while inbox.unread(name):
         if clock.now_s() >= until_s:
             return _unheard(folder, request, inbox, name)
-        clock.sleep(LOOK_EVERY_S)
+        clock.sleep(POLL_EVERY_S)
     return True
 
 

@@ -104,9 +104,9 @@ def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -
     """The line; depends only on the files that `stamp` represents (cached). Raises StudyError, OSError."""
     content = read_regular(folder.log)
     opened = read_opening(folder.log)
-    ours = isinstance(opened, SessionOpened) and opened.session == folder.name and is_sealed(folder.path, content)
-    ours = ours and MEASURED in content  # a person who does not take part left a short log
-    planned = _protocol_and_runs(opened.protocol_text) if ours and isinstance(opened, SessionOpened) else None
+    is_own = isinstance(opened, SessionOpened) and opened.session == folder.name and is_sealed(folder.path, content)
+    is_own = is_own and MEASURED in content  # a person who does not take part left a short log
+    planned = _protocol_and_runs(opened.protocol_text) if is_own and isinstance(opened, SessionOpened) else None
     if planned is None or not isinstance(opened, SessionOpened):
         return line_of(fold_session(folder).state, folder)
     protocol, run_count = planned

@@ -53,10 +53,10 @@ class Outlet(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SideTasks:
-    """What else is done between two looks at the log."""
+    """Tasks between two readings of the log."""
 
     on_offset: Callable[[float], None]
-    """Told the offset of the clocks at first, and whenever it has changed by `NOTED_S`."""
+    """Called with the offset of the clocks at first, and whenever it has changed by `NOTED_S`."""
     push_signals: Callable[[float], int]
     """Given that offset: sends what the device's loop did meanwhile, and answers how many ticks were lost."""
 
@@ -101,7 +101,7 @@ def stream_session(
             return 0
         while True:
             if now_s() >= next_offset_s:
-                offset_s, next_offset_s = measured_offset_s(outlet, now_s), now_s() + OFFSET_EVERY_S
+                offset_s, next_offset_s = measure_offset_s(outlet, now_s), now_s() + OFFSET_EVERY_S
                 outlet.push(_text({"event": "clock", "lsl_minus_monotonic_s": offset_s}), outlet.clock_s())
                 if not abs(offset_s - noted_s) < NOTED_S:
                     noted_s = offset_s
@@ -119,7 +119,7 @@ def stream_session(
         raise not_followed_error(log, problem) from problem
 
 
-def measured_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
+def measure_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
     """LSL's clock less the session's, from the reading that took least time."""
     pairs = []
     for _ in range(OFFSET_TRIES):

@@ -77,7 +77,9 @@ class Follower:
         return self._drifts.look(watched.probes)
 
     def _take_in_what_is_new(self) -> None:
-        sealed_bytes = self._sealed_bytes()  # before the log is read: it is written after the lines that it covers
+        sealed_bytes = (
+            self._count_sealed_bytes()
+        )  # before the log is read: it is written after the lines that it covers
         try:
             with open_regular(self._folder.log) as file:
                 self._begin_again_if_rewritten(file)
@@ -101,7 +103,7 @@ class Follower:
         elif sealed_bytes > self._read_bytes:
             self._problem = "its end is missing."
 
-    def _sealed_bytes(self) -> int | None:
+    def _count_sealed_bytes(self) -> int | None:
         """Sealed length of the log; None if a seal cannot be read."""
         try:
             return max((read_seal(path).bytes for path in seal_paths(self._folder.path).values()), default=0)

@@ -90,7 +90,9 @@ def test_the_improved_model_is_of_the_commands_as_they_were_recorded():
     assert (pull.kind, friction.kind) == ("constant_force", "coulomb_friction")
     assert pull.parameters["force"] == pytest.approx(-0.3, rel=0.05)
     assert friction.parameters["level"] == pytest.approx(0.5, rel=0.05)
-    without, with_them = (prediction_error(against, each, "test").as_it_is for each in (found.retuned, found.improved))
+    without, with_them = (
+        prediction_error(against, each, "test").without_gain for each in (found.retuned, found.improved)
+    )
     assert with_them < 0.2 * without < 0.1
 
 

@@ -10,7 +10,7 @@ from analysis.figures.look_pictures import look_pictures
 from analysis.look.clock import CLOCK
 from analysis.look.overview import overview
 from analysis.reports.look_report import brief, render_look_report
-from analysis.wording import untimed_text
+from analysis.wording import write_without_time
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -54,4 +54,4 @@ def test_its_page_counts_samples():
      ("unit per √Hz", "unit per √(cycle per sample)"), ("3 steps", "3 steps")],
 )  # fmt: skip
 def test_units_of_time_are_replaced_alone(text, wanted):
-    assert untimed_text(text) == wanted
+    assert write_without_time(text) == wanted

@@ -10,7 +10,13 @@ from analysis.diagnosis.result.plausibility import implausible_sentences
 from analysis.diagnosis.result.wording import final_moved_parameters, summary_lines
 from analysis.reports.diagnosis_method import method_paragraphs
 from analysis.reports.diagnosis_report import render_diagnosis_report
-from analysis.reports.diagnosis_tables import channel_table, mismatch_table, parameter_table, retuned_table, rival_table
+from analysis.reports.diagnosis_tables import (
+    channel_table,
+    mismatch_table,
+    parameter_table,
+    rival_table,
+    tabulate_retuned,
+)
 from equalizer.effects.effect import PlacedEffect
 
 PLACE = Mismatch("ax", "fx", (8.0, 16.0), 0.5, None, 0.8, 1e-9)
@@ -163,9 +169,9 @@ def test_a_long_list_of_places_is_cut_and_reports_it():
 
 
 def test_every_open_number_is_listed_with_how_far_it_moved(friction_found):
-    table = retuned_table(friction_found)
+    table = tabulate_retuned(friction_found)
     assert [row[0] for row in table.rows] == list(friction_found.tuning.names)
-    assert retuned_table(replace(friction_found, tuning=None)) is None
+    assert tabulate_retuned(replace(friction_found, tuning=None)) is None
 
 
 @pytest.mark.parametrize(

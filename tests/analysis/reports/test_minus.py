@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.localisation.state_regions import region_in_words
-from analysis.diagnosis.real_answer.real_answer import OwnNumber
+from analysis.diagnosis.real_answer.real_answer import OwnParameter
 from analysis.diagnosis.result.wording import summary_lines
 from analysis.evaluation.reproduction.document import FigureFindings, PlayedRow, Reproduction
 from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.reports.diagnosis_report import render_diagnosis_report
-from analysis.reports.real_report import number_sentence
+from analysis.reports.real_report import parameter_sentence
 from analysis.reports.reproduction_report import render_reproduction_report
 from analysis.reports.study_report import render_study_report
-from analysis.wording import number, signed_number, typeset
+from analysis.wording import format_signed, number, typeset
 
 HYPHEN_BEFORE_NUMBER = re.compile(r"(?<![\w-])-\.?\d\S*")
 """Not in "2026-01-02" nor "gpt-2": there something stands before it."""
@@ -55,8 +55,8 @@ def assert_one_spelling(found):
 @pytest.mark.parametrize(
     ("said", "expected"),
     [
-        (number(-1.5), "−1.50"), (number(-0.001), "0.00"), (number(2.0, 0), "2"), (signed_number(-1.26, 1), "−1.3"),
-        (signed_number(1.26, 1), "+1.3"), (typeset("1e-07"), "1e−07"),
+        (number(-1.5), "−1.50"), (number(-0.001), "0.00"), (number(2.0, 0), "2"), (format_signed(-1.26, 1), "−1.3"),
+        (format_signed(1.26, 1), "+1.3"), (typeset("1e-07"), "1e−07"),
     ],
 )  # fmt: skip
 def test_a_number_is_written_with_the_minus_sign_and_a_zero_without(said, expected):
@@ -91,7 +91,7 @@ def test_on_the_page_of_the_published_figures():
 
 def test_in_sentences():
     said = [
-        number_sentence(OwnNumber("mass", "kg", 0.9, 0.8, 1.0, 1.0)),
+        parameter_sentence(OwnParameter("mass", "kg", 0.9, 0.8, 1.0, 1.0)),
         region_in_words("position", "x", "m", (1, 1, 4), -0.012, one_stratum=True),
     ]
     assert said[1] == "near x = −12 mm"

@@ -52,7 +52,7 @@ def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, 
         known = sensitivity(measure, tuning, found.deviations, found.hypothesis)
     left = np.sqrt(np.mean(found.residuals[0][record.test] ** 2, axis=0))
     assert np.all(left < 1.08)
-    (placed,) = found.hypothesis.placed_effects()
+    (placed,) = found.hypothesis.list_placed_effects()
     ((name, value),) = truth["values"].items()
     assert effect.report(placed.values)[name] == pytest.approx(value, rel=WITHIN)
     assert placed.sites == (("xyz".index(truth["axis"]),) if truth["axis"] else (0, 1, 2))

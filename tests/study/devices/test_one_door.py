@@ -16,7 +16,7 @@ NAMED_IN = {
     "SafeDevice": {"study/devices/opening.py"},
     "RIGS_BY_NAME": {"study/devices/opening.py"},
     "find_rig": {"study/devices/opening.py"},
-    "simulated_rig": set(),
+    "make_simulated_rig": set(),
     "replay_rig": {"study/devices/rigs_by_name.py"},
     "build_omega3": {"study/devices/rigs_by_name.py"},
     "force_dimension_rig": {"study/devices/rigs_by_name.py"},

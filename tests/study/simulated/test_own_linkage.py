@@ -8,7 +8,7 @@ import pytest
 from equalizer.linkage.calibration import inertia_about
 from equalizer.linkage.grid import beside, difference_error, symmetric_grid
 from study.devices.rig import POSITION
-from study.devices.simulated.own_linkage import SimulatedLinkage, fit_linkage, simulated_linkage
+from study.devices.simulated.own_linkage import SimulatedLinkage, fit_linkage, make_simulated_linkage
 from study.devices.simulated.parameters import Linkage, Masses, Omega3Parameters
 from tests.equalizer.linkage.truth import calibration
 
@@ -20,13 +20,13 @@ OTHER = replace(
 
 
 def told(parameters=OTHER, spoil=lambda reading: reading):
-    linkage = SimulatedLinkage(parameters, simulated_linkage().info)
+    linkage = SimulatedLinkage(parameters, make_simulated_linkage().info)
     places = np.array(np.meshgrid(*3 * [[-0.04, -0.02, 0.0, 0.02, 0.04]], indexing="ij")).reshape(3, -1).T
     return calibration([spoil(linkage.at(place)) for place in places])
 
 
 def test_its_jacobian_is_the_derivative_of_its_own_positions():
-    linkage = simulated_linkage()
+    linkage = make_simulated_linkage()
     for place in ([0.0, 0, 0], [0.03, -0.02, 0.04]):
         places = beside(np.array(place))
         angles = np.array([linkage.angles_at(each) for each in places])
@@ -34,7 +34,7 @@ def test_its_jacobian_is_the_derivative_of_its_own_positions():
 
 
 def test_its_inertia_at_the_centre_is_what_it_says_as_a_device():
-    linkage = simulated_linkage()
+    linkage = make_simulated_linkage()
     np.testing.assert_allclose(
         linkage.at(np.zeros(3)).inertia_kg, linkage.info.effective_mass_kg * np.eye(3), atol=1e-9
     )
@@ -43,7 +43,7 @@ def test_its_inertia_at_the_centre_is_what_it_says_as_a_device():
 @pytest.mark.parametrize("place_m", [(0.0, 0.0, 0.0), (0.01, -0.02, 0.01)])
 def test_slopes_of_its_inertia_are_found_from_the_grid(place_m):
     """Oracle: differences of the linkage's own equations. The grid knows nothing between its positions."""
-    linkage, place, step = simulated_linkage(), np.array(place_m), 1e-4
+    linkage, place, step = make_simulated_linkage(), np.array(place_m), 1e-4
     grid = symmetric_grid(np.radians([90.0, 210.0, 330.0]), 0.05, 0.04)
     slopes = inertia_about(calibration([linkage.at(each) for each in grid]), place)[1]
     asides = step * np.eye(3)
@@ -52,7 +52,7 @@ def test_slopes_of_its_inertia_are_found_from_the_grid(place_m):
 
 
 def test_in_the_stops_it_tells_nothing():
-    linkage = simulated_linkage()
+    linkage = make_simulated_linkage()
     assert linkage.at(np.array([0.08, 0, 0])) is None and linkage.angles_at(np.array([0.08, 0, 0])) is None
 
 

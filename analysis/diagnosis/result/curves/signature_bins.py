@@ -55,7 +55,9 @@ def correlation_ratio(at: FloatArray, values: FloatArray) -> float:
     return float(np.var(means[bin_of]) / max(float(np.var(values)), 1e-300))
 
 
-def running_rms(seconds: FloatArray, values: FloatArray, used: Mask) -> tuple[FloatArray, FloatArray, FloatArray]:
+def compute_running_rms(
+    seconds: FloatArray, values: FloatArray, used: Mask
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Time, rms and its standard error, in stretches with equal numbers of used samples. All inputs: (n,)"""
     parts = [part for part in np.array_split(np.flatnonzero(used), _BINS) if len(part)]
     rms = np.array([float(np.sqrt(np.mean(values[part] ** 2))) for part in parts])

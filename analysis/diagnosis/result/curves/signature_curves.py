@@ -10,7 +10,7 @@ import numpy as np
 from analysis.diagnosis.errors.evidence_from_residuals import EXPECTED
 from analysis.diagnosis.forces.missing_force import missing_force
 from analysis.diagnosis.result.curves.law_curves import law_signature
-from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, running_rms
+from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, compute_running_rms
 from analysis.diagnosis.result.findings import Signature
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
 from equalizer.effects.simulation.simulator import SimulationResult, simulate_mechanism
@@ -81,7 +81,7 @@ def signature_of(evidence: Evidence, complete: FloatArray, placed: PlacedEffect,
     if along in ("reading", "time", "growth") and isinstance(acts, OnResponse):
         changed = acts.change(evidence.predicted, evidence.sample_rate_hz, placed.sites, placed.values)
         if along == "reading":
-            return _reading_signature(evidence, placed, changed - evidence.predicted, names)
+            return _make_reading_signature(evidence, placed, changed - evidence.predicted, names)
         return _time_signature(evidence, placed, changed - evidence.predicted, names, along)
     return _frequency_signature(evidence, complete - evidence.predicted, placed, names)
 
@@ -141,7 +141,7 @@ def _command_signature(evidence: Evidence, placed: PlacedEffect, names: Names) -
     )  # fmt: skip
 
 
-def _reading_signature(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names) -> Signature:
+def _make_reading_signature(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names) -> Signature:
     used = evidence.used > 0
     drives = evidence.predicted[used]
     # The pair of channels with the strongest effect: regression of the change in one channel on the signal of the
@@ -165,8 +165,8 @@ def _time_signature(
     errors, seconds = (evidence.response - evidence.predicted)[:, here], np.arange(len(change)) / rate_hz
     what = f"error of {names.channels[here]} ({names.unit})"
     if along == "growth":
-        at, mean, spread = running_rms(seconds, errors, used)
-        law_at, law, _ = running_rms(seconds, np.hypot(change[:, here], evidence.noise[here]), used)
+        at, mean, spread = compute_running_rms(seconds, errors, used)
+        law_at, law, _ = compute_running_rms(seconds, np.hypot(change[:, here], evidence.noise[here]), used)
         what = f"rms {what}"
     else:
         at, mean, spread = bin_means(seconds, errors, used, rate_hz)

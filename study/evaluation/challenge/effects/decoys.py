@@ -1,4 +1,4 @@
-"""Decoys: physics outside the catalogue, which an honest diagnosis must leave unexplained.
+"""Decoys: physics outside the catalogue, which a diagnosis must leave unexplained.
 
 creep: viscoelastic ground with three relaxation times over two decades, as in plastics and cables. damping_of_place:
 damping grows with the square of the distance from the centre. stiffness_in_time: the ground stiffness of one axis

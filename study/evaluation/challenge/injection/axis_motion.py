@@ -49,8 +49,8 @@ class AxisMotion:
 def _end_hz(samples: FloatArray, rate_hz: float) -> float:
     """Highest frequency at which the power exceeds the noise floor."""
     frequency, power = welch(samples, rate_hz, nperseg=min(len(samples), 2048))
-    loud = np.flatnonzero(power > LOUD * np.median(power[3 * len(power) // 4 :]))
-    last = float(frequency[loud[-1]]) if len(loud) else 0.0
+    above_noise = np.flatnonzero(power > LOUD * np.median(power[3 * len(power) // 4 :]))
+    last = float(frequency[above_noise[-1]]) if len(above_noise) else 0.0
     return float(np.clip(last, 20 * rate_hz / len(samples), WIDEST * rate_hz))
 
 

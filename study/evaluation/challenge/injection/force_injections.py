@@ -25,7 +25,7 @@ SHARP = 0.05
 """Width of the sign change of dry friction, as a fraction of the rms speed."""
 
 
-def _scaled_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceInjection:
+def _scale_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceInjection:
     """Injection of a force with one parameter, which scales a given shape."""
 
     def draw(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
@@ -88,14 +88,14 @@ def _add_bristles(motion: AxisMotion, values: Values) -> FloatArray:
 
 
 FORCE_INJECTIONS: tuple[ForceInjection, ...] = (
-    _scaled_shape("added_mass", lambda motion: motion.a),
-    _scaled_shape("viscous_damping", lambda motion: motion.v),
-    _scaled_shape("quadratic_damping", lambda motion: motion.v * np.abs(motion.v)),
-    _scaled_shape("coulomb_friction", _sign),
+    _scale_shape("added_mass", lambda motion: motion.a),
+    _scale_shape("viscous_damping", lambda motion: motion.v),
+    _scale_shape("quadratic_damping", lambda motion: motion.v * np.abs(motion.v)),
+    _scale_shape("coulomb_friction", _sign),
     ForceInjection("asymmetric_friction", _draw_asymmetric, _add_asymmetric_friction),
     ForceInjection("presliding_hysteresis", _draw_bristles, _add_bristles, memory=True),
-    _scaled_shape("added_stiffness", _centre_position),
-    _scaled_shape("hardening_stiffness", lambda motion: _centre_position(motion) ** 3),
+    _scale_shape("added_stiffness", _centre_position),
+    _scale_shape("hardening_stiffness", lambda motion: _centre_position(motion) ** 3),
     ForceInjection("cogging", _draw_cogging, _add_cogging),
     ForceInjection(
         "end_stop",

@@ -15,7 +15,7 @@ from study.evaluation.challenge.draw_case import (
     EFFECTS,
     Case,
     Concealed,
-    added_mass_meta,
+    describe_added_mass,
     further_plan,
     make_recording,
     truth_of,
@@ -67,9 +67,9 @@ def draw_mujoco_case(
     def again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
         further = further_plan(command, kind, rig)
         heavier = replace(device, mass_kg=device.mass_kg + added_kg)
-        felt = simulate_motion(heavier, further.command)
-        readings = read(sensing.sensor, *felt, RATE_HZ, np.random.default_rng([seed, noise]))
-        return replace(make_recording(name, further, *readings, rig), meta=added_mass_meta(added_kg))
+        measured_motion = simulate_motion(heavier, further.command)
+        readings = read(sensing.sensor, *measured_motion, RATE_HZ, np.random.default_rng([seed, noise]))
+        return replace(make_recording(name, further, *readings, rig), meta=describe_added_mass(added_kg))
 
     adds = visibility(Device(bench), sensing, (still, motion), rig) if effects else 0.0
     return Case(recording, as_model(name, known, tolerance, rig.axes), tuple(truth), again, adds)

@@ -86,7 +86,7 @@ def controller_settings(weight: float, preview_s: float, cap_n: float) -> Realti
         raise _refusal(f"{capitalise(str(problem))}.", TRY) from problem
 
 
-def exported_summary(exported: ExportedController) -> dict[str, Any]:
+def summarise_export(exported: ExportedController) -> dict[str, Any]:
     """The export as plain values, for one JSON document. Errors are relative, as predicted by the model itself."""
     controller, rate_hz = exported.controller, exported.model.sample_rate_hz
     return {
@@ -103,7 +103,7 @@ def exported_summary(exported: ExportedController) -> dict[str, Any]:
     }
 
 
-def exported_warnings(exported: ExportedController) -> tuple[str, ...]:
+def warn_of_export(exported: ExportedController) -> tuple[str, ...]:
     """A warning if the controller's cap is above the force that hapteq plays with a hand on the handle; else empty."""
     cap_n = exported.controller.cap_n
     if cap_n <= HAND_STIMULUS_CAP_N:
@@ -114,10 +114,10 @@ def exported_warnings(exported: ExportedController) -> tuple[str, ...]:
     )
 
 
-def exported_lines(exported: ExportedController) -> tuple[str, ...]:
+def describe_export(exported: ExportedController) -> tuple[str, ...]:
     """Lines for the terminal: files, length of the transient, delay and predicted error of the stream, command of the
     check."""
-    found, (low_hz, high_hz) = exported_summary(exported), exported.model.band_hz
+    found, (low_hz, high_hz) = summarise_export(exported), exported.model.band_hz
     return (
         *found["files"],
         f"Transient: {found['transient_rows']} rows with their room to come to rest, turned by any rotation.",

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.balance.balances import look_again, samples_in_motion
 from analysis.diagnosis.balance.motion import motions_of
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME
 
 RATE_HZ, LEVEL, MASS, DAMPING = 100.0, 0.4, 0.05, 0.8
@@ -96,6 +96,6 @@ def test_samples_in_motion_alone_show_what_holds_the_axis(friction, wander, reco
     force, position = _pushed(friction, wander=wander)
     speed = np.gradient(position[:, 0], 1 / RATE_HZ)
     assert np.mean(speed**2 > 0.01 * np.mean(speed**2)) < MOVES_MOST_OF_THE_TIME
-    records = observed_parts((recording_of(force, position, RATE_HZ),), 1)
+    records = observe_parts((recording_of(force, position, RATE_HZ),), 1)
     found = look_again(samples_in_motion, records, motions_of(records), frozenset(), lambda: True, map)
     assert bool(found) == bool(friction)

@@ -8,8 +8,8 @@ import pytest
 from analysis.diagnosis.balance.balances import motions_in_own_band
 from analysis.diagnosis.balance.motion import motion_band_hz, motions_of
 from analysis.diagnosis.confirm.fitting_measures import choose_fitting_measure
-from analysis.diagnosis.confirm.measures_of_balances import BALANCE_LEAVES_LESS, choose_plain_forces
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.confirm.measures_of_balances import BALANCE_LEAVES_LESS, choose_forces_of_balance
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.search_by_simulation import _unseen_by_balance
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -53,7 +53,7 @@ def recorded(recording_of):
 
 
 def test_the_band_of_the_motion_is_that_of_the_driven_one(recorded):
-    records = observed_parts([recorded(FRICTION)], 2)
+    records = observe_parts([recorded(FRICTION)], 2)
     motions = motions_of(records)
     hub_hz, both_hz = motion_band_hz(motions, [0]), motion_band_hz(motions, [0, 1])
     (narrow,) = motions_in_own_band(records, motions)
@@ -85,7 +85,7 @@ def test_where_no_law_is_named_the_linear_numbers_that_leave_less_of_the_forces_
     recording = recorded(0.0)
     balances = balance_of(recording)
     given = choose_fitting_measure([recording], hub_and_beam(5 * HUB), (), "force", about_mean=True)
-    plain = choose_plain_forces([recording], given, balances)
+    plain = choose_forces_of_balance([recording], given, balances)
     assert plain.model.mass.shape == (1, 1)
     assert BALANCE_LEAVES_LESS in plain.chosen.remarks
     left = [rms_of_forces(each) for each in (given, plain)]
@@ -100,7 +100,7 @@ def test_a_given_model_that_leaves_less_stays(recording_of, balance_of):
     given = choose_fitting_measure([recording], true, (), "force")
     wrong = choose_fitting_measure([recording], replace(true, mass=3 * true.mass), (), "force")
     balances = balance_of(recording)
-    left = [rms_of_forces(choose_plain_forces([recording], each, balances)) for each in (given, wrong)]
+    left = [rms_of_forces(choose_forces_of_balance([recording], each, balances)) for each in (given, wrong)]
     assert left[0] <= rms_of_forces(given)
     assert left[1] < 0.5 * rms_of_forces(wrong)
 
@@ -111,7 +111,7 @@ def test_a_constant_force_does_not_decide_which_is_taken(recorded, balance_of, o
     command = replace(recording.command, samples=recording.command.samples + offset)
     moved = replace(recording, command=command)
     given = choose_fitting_measure([moved], hub_and_beam(5 * HUB), (), "force", about_mean=True)
-    plain = choose_plain_forces([moved], given, balance_of(moved))
+    plain = choose_forces_of_balance([moved], given, balance_of(moved))
     assert BALANCE_LEAVES_LESS in plain.chosen.remarks
     assert plain.is_reduced
     assert rms_of_forces(plain) < 0.3 * rms_of_forces(given)
@@ -133,8 +133,8 @@ def test_effects_of_the_actuator_are_tried_on_the_commands_as_they_are_alone(nam
 def test_with_a_named_law_or_without_balances_the_model_stays(recorded, balance_of):
     recording = recorded(FRICTION)
     given = choose_fitting_measure([recording], hub_and_beam(5 * HUB), (), "force", about_mean=True)
-    assert choose_plain_forces([recording], given, balance_of(recording)) is given
-    assert choose_plain_forces([recording], given, ()) is given
+    assert choose_forces_of_balance([recording], given, balance_of(recording)) is given
+    assert choose_forces_of_balance([recording], given, ()) is given
 
 
 def driven_body(recording_of, rng):

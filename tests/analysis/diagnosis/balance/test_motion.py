@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.balance.laws import laws_of
 from analysis.diagnosis.balance.motion import NoMotionError, motion_signal, motions_of
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import BAND_WIDEST
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import Signal
@@ -26,7 +26,7 @@ def course(times, later=0.0):
 
 
 def motion_of(recording):
-    return motions_of(observed_parts([recording], len(recording.response.channels)))[0]
+    return motions_of(observe_parts([recording], len(recording.response.channels)))[0]
 
 
 def off(found, truth):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.motion import motion_band_hz, motions_of
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 
 RATE_HZ, SECONDS, SEED = 300.0, 20.0, 3
 INERTIA, DAMPING, SPRING, LAG_S, STEP, FIRST, DITHER = 1e-3, 1.2e-2, 1.6, 0.03, 6e-3, 1.2, 3.0
@@ -37,7 +37,7 @@ def recorded(recording_of):
 
 def test_a_spring_that_hardens_shows_in_the_band_of_the_motion(recorded, balance_of):
     recording = recorded(1.5)
-    motions = motions_of(observed_parts([recording], 1))
+    motions = motions_of(observe_parts([recording], 1))
     (balance,) = balance_of(recording)
     assert balance.search.regression.motions[0].band_hz == pytest.approx(motion_band_hz(motions, [0]))
     (law,) = balance.named
@@ -52,5 +52,5 @@ def test_a_straight_spring_has_no_name_in_either_band(recorded, balance_of):
 def test_a_slow_course_moves_in_a_narrow_band(recording_of):
     time_s = np.arange(3000) / RATE_HZ
     slow = np.sin(2 * np.pi * time_s) + 0.001 * np.sin(2 * np.pi * 30 * time_s)
-    motions = motions_of(observed_parts([recording_of(slow[:, None], slow[:, None], RATE_HZ)], 1))
+    motions = motions_of(observe_parts([recording_of(slow[:, None], slow[:, None], RATE_HZ)], 1))
     assert motion_band_hz(motions, [0]) == pytest.approx(1.0, abs=0.2)

@@ -9,7 +9,7 @@ from analysis.diagnosis.balance.law import Law, name_weights
 from analysis.diagnosis.balance.motion import motions_of
 from analysis.diagnosis.balance.regression import fit_all_laws, keep_laws, regression_of, replace_law
 from analysis.diagnosis.balance.structures import Structure, is_better
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import BALANCE_FOLDS
 
 RATE_HZ, COUNT = 500.0, 6000
@@ -31,7 +31,7 @@ def regression(recording_of):
         force = 0.4 * np.gradient(np.gradient(q)) * RATE_HZ**2 + 3.0 * np.gradient(q) * RATE_HZ + 40 * q + 30 * q**3
         force += 5 * np.tanh(np.gradient(q) * RATE_HZ) + random.standard_normal(COUNT)
         records.append(recording_of(force[:, None], q[:, None], RATE_HZ))
-    motions = motions_of(observed_parts(records, 1))
+    motions = motions_of(observe_parts(records, 1))
     return regression_of(motions, 0, (SCALE, CUBE, PAIR), turns=False)
 
 

@@ -21,9 +21,8 @@ from analysis.diagnosis.confirm.laws_for_simulation import can_be_played, find_s
 from analysis.diagnosis.confirm.require_gain import ONLY_BESIDE_CALIBRATION, unname_doubtful_effects
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.search_context import FittedCandidate
-from analysis.diagnosis.search.verdict import Judgement
+from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.instant import LENGTH, X_FREE, X
 
@@ -241,7 +240,7 @@ def test_a_stop_is_played_on_whichever_side_of_zero_it_stands(position_m, side, 
     judged = SimpleNamespace(formula=None, law=SimpleNamespace(effect="end_stop", channel=0), values=values)
     assert can_be_played(0, judged)
 
-    (placed,) = hypothesis_of_judged(0, judged, None).placed_effects()
+    (placed,) = hypothesis_of_judged(0, judged, None).list_placed_effects()
     at, numbers = np.zeros(LENGTH), placed.effect.acts.pack(None, 0, placed.values)
     at[X] = at[X_FREE] = pushing_at_m
     assert placed.effect.acts.law(numbers, np.zeros(1), at) == pytest.approx(-800.0 * (pushing_at_m - position_m))

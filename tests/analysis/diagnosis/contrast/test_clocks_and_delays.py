@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.contrast.actuator_faults import AROUND, delays_to_try
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
-from analysis.diagnosis.contrast.bases import bases_of, unexplained_share
+from analysis.diagnosis.contrast.bases import bases_of, compute_unexplained_share
 from analysis.diagnosis.contrast.compare import compare
 from analysis.diagnosis.contrast.compared_base import (
     FEWEST_ROWS,
@@ -238,7 +238,7 @@ def test_a_smooth_response_is_predicted_as_well_as_its_past_allows():
     parts = split_into_parts([late])
     compared = compare_base(AutoregressiveBase(0, 24, 1, 1), parts, parts)
     assert compared.clean.scale * compared.columns[0] == pytest.approx(innovation, rel=0.1)
-    assert unexplained_share(compared.base, parts) == pytest.approx(innovation, rel=0.1)
+    assert compute_unexplained_share(compared.base, parts) == pytest.approx(innovation, rel=0.1)
 
 
 def test_sensor_faults_of_a_response_with_hardly_any_noise_can_be_undone():

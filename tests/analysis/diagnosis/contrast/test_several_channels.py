@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.contrast.compare import compare
 from analysis.diagnosis.contrast.decide import decide
-from analysis.diagnosis.result.contrast_findings import _named_fault
+from analysis.diagnosis.result.contrast_findings import _name_fault
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.unit_system import LINEAR
@@ -39,7 +39,7 @@ def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(r
     assert found is not None and not found.by_force
     answer = decide(found, 1)
     assert answer.named is not None
-    named = _named_fault(answer.named, answer, faulty, LINEAR)
+    named = _name_fault(answer.named, answer, faulty, LINEAR)
     assert (named.effect, named.axis) == ("force_gain", "y")
     assert named.parameters["gain"].value == pytest.approx(gain, rel=0.05)
 

@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed import Span, error_units, measured_signals, moving_spans, observe, roles
+from analysis.diagnosis.data.observed import (
+    Span,
+    error_units,
+    find_moving_spans,
+    observe,
+    roles,
+    stack_measured_signals,
+)
 from analysis.diagnosis.settings import MODEL_FLOOR
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -48,7 +55,7 @@ def test_the_last_quarter_of_each_part_s_motion_is_sealed():
     response = np.where(time_s < 4, np.sin(9 * time_s), 0.0)[:, None]
     response[600:] = np.sin(time_s[600:])[:, None]
     response[600:603] = np.nan
-    spans = moving_spans(response, [(0, 600), (600, 1000)])
+    spans = find_moving_spans(response, [(0, 600), (600, 1000)])
     assert spans == (Span(0, pytest.approx(400, abs=2), 600), Span(600, 1000, 1000))
     fit, choose, test = roles((), 1000, spans=spans)
     assert np.flatnonzero(test)[0] == pytest.approx(300, abs=2)
@@ -66,11 +73,11 @@ def test_gaps_between_parts_and_their_order_are_nothing_to_the_roles(tested):
 
 
 def test_what_hardly_moves_is_split_as_if_it_moved_for_half_of_the_time():
-    assert moving_spans(np.ones((100, 1)), [(0, 100)]) == (Span(0, 100, 100),)
+    assert find_moving_spans(np.ones((100, 1)), [(0, 100)]) == (Span(0, 100, 100),)
     settles = np.minimum(np.arange(100.0), 10)[:, None]
-    assert moving_spans(settles, [(0, 100)]) == (Span(0, 50, 100),)
+    assert find_moving_spans(settles, [(0, 100)]) == (Span(0, 50, 100),)
     unread = np.hstack([settles, np.full((100, 1), np.nan)])
-    assert moving_spans(unread, [(0, 100)]) == (Span(0, 50, 100),)
+    assert find_moving_spans(unread, [(0, 100)]) == (Span(0, 50, 100),)
 
 
 def test_segments_without_roles_are_treated_alike_and_the_pauses_count_for_nothing():
@@ -142,9 +149,9 @@ def test_lost_samples_count_for_nothing():
 
 def test_positions_are_compared_where_they_belong_to_the_outputs():
     samples = np.ones((50, 2))
-    assert measured_signals(recording(samples, 2 * samples), 2)[0].shape == (50, 4)
-    assert measured_signals(recording(samples, np.ones((50, 3))), 2)[0].shape == (50, 2)
-    assert measured_signals(recording(samples), 2)[0].shape == (50, 2)
+    assert stack_measured_signals(recording(samples, 2 * samples), 2)[0].shape == (50, 4)
+    assert stack_measured_signals(recording(samples, np.ones((50, 3))), 2)[0].shape == (50, 2)
+    assert stack_measured_signals(recording(samples), 2)[0].shape == (50, 2)
 
 
 def test_decisions_do_not_reach_the_sealed_samples():

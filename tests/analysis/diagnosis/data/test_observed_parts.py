@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import observed_parts, samples_to_fit
+from analysis.diagnosis.data.observed_parts import observe_parts, samples_to_fit
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
@@ -27,7 +27,7 @@ def three_levels() -> Recording:
 
 
 def test_the_middle_level_is_chosen_by_and_every_level_is_tested_by():
-    (one,) = observed_parts([three_levels()], 1)
+    (one,) = observe_parts([three_levels()], 1)
     assert np.flatnonzero(one.choose)[[0, -1]].tolist() == [LONG, LONG + 3 * LONG // 4 - 1]
     assert [int(one.test[k * LONG : (k + 1) * LONG].sum()) for k in range(3)] == [LONG // 4] * 3
     assert one.fit[:LONG].any() and one.fit[2 * LONG :].any()
@@ -38,7 +38,7 @@ def test_where_the_middle_level_was_lost_some_of_what_is_left_is_chosen_by():
     lost = whole.response.samples.copy()
     lost[LONG : 2 * LONG] = np.nan
     recording = replace(whole, response=replace(whole.response, samples=lost))
-    (one,) = observed_parts([recording], 1)
+    (one,) = observe_parts([recording], 1)
     assert one.choose.any() and one.fit.any() and one.test.any()
     assert np.isfinite(lost[one.fit | one.choose | one.test]).all()
     assert samples_to_fit([recording]) == one.fit.sum()

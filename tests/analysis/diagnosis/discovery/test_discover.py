@@ -21,8 +21,7 @@ from analysis.diagnosis.discovery.view_terms import view_terms
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.result.wording import summary_lines
-from analysis.diagnosis.search.search import SearchResult
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import SearchResult, judge
 from analysis.diagnosis.search_by_simulation import has_law
 from analysis.diagnosis.settings import LAW_PLACEBO
 from equalizer.effects.catalogue import CATALOGUE

@@ -12,9 +12,8 @@ from analysis.diagnosis.discovery.validation import does_as_well_with_less
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.search import SearchResult
 from analysis.diagnosis.search.time_budget import CountedBudget
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import SearchResult, judge
 from equalizer.effects.catalogue import EFFECTS
 from tests.lawful import arena_of, law, recorded
 

@@ -13,8 +13,7 @@ from analysis.diagnosis.discovery.validation import choose_on_held_out, holds_el
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.search import SearchResult
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import SearchResult, judge
 from equalizer.effects.discovered_law import law_channels, law_effect, law_values
 from tests.lawful import arena_of, law, recorded
 

@@ -17,7 +17,7 @@ from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.law_of_sum import hypothesis_of_sum, law_of_sum, laws_of
 from analysis.diagnosis.discovery.matched_filter import views_of
-from analysis.diagnosis.discovery.view_terms import reading_terms
+from analysis.diagnosis.discovery.view_terms import terms_of_readings
 from analysis.diagnosis.document import Candidate, diagnosis_from_json, found_law
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
@@ -163,7 +163,7 @@ def test_what_is_added_to_a_signal_can_be_none():
 
 def test_readings_hold_products_with_other_readings_and_nothing_linear():
     columns = {name: np.linspace(-1.0, 1.0, 50) for name in ("ax", "ay", "t")}
-    shapes = [term.shape for term in reading_terms(columns, 1, 2)]
+    shapes = [term.shape for term in terms_of_readings(columns, 1, 2)]
     assert "ay*ax" in shapes
     assert not {"ax", "ay"} & set(shapes)
 

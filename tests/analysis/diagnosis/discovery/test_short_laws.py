@@ -11,9 +11,9 @@ from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.law_of_sum import laws_of
 from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.search.search import Beyond, SearchResult, search_effects
+from analysis.diagnosis.search.search import Beyond, search_effects
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
-from analysis.diagnosis.search.verdict import Judgement, judge
+from analysis.diagnosis.search.verdict import Judgement, SearchResult, judge
 from analysis.diagnosis.settings import LAW_ALONE_LEAVES
 from equalizer.effects.catalogue import EFFECTS
 from tests.lawful import arena_of, law, recorded

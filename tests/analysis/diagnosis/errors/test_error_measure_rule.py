@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.errors.error_measure_rule import choose_measure, is_self_stable
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import Signal
@@ -14,33 +14,33 @@ from tests.analysis.diagnosis.errors.drifting_plant import RATE_HZ, model
 
 def test_the_rule_keeps_free_simulation_for_plants_that_hold_themselves(held: Recording, drifting: Recording) -> None:
     for each in (held, drifting):
-        assert choose_measure(observed_parts([each], 1), model(stiffness=400.0)).measure == "free simulation"
+        assert choose_measure(observe_parts([each], 1), model(stiffness=400.0)).measure == "free simulation"
 
 
 def test_the_rule_takes_forces_where_a_model_grows_within_a_window(drifting: Recording) -> None:
-    choice = choose_measure(observed_parts([drifting], 1), model(stiffness=-400.0))
+    choice = choose_measure(observe_parts([drifting], 1), model(stiffness=-400.0))
     assert choice.measure == "predicted force"
     assert "held by a controller" in choice.why
     felt = replace(drifting, response=replace(drifting.response, quantity="acceleration", unit="m/s^2"))
-    choice = choose_measure(observed_parts([felt], 1), model(stiffness=-400.0, quantity="acceleration"))
+    choice = choose_measure(observe_parts([felt], 1), model(stiffness=-400.0, quantity="acceleration"))
     assert choice.measure == "windows"
 
 
 def test_the_rule_takes_windows_where_a_recording_begins_in_motion(drifting: Recording) -> None:
     moving = replace(drifting, response=replace(drifting.response, samples=drifting.response.samples + 0.3))
-    choice = choose_measure(observed_parts([moving], 1), model(stiffness=400.0))
+    choice = choose_measure(observe_parts([moving], 1), model(stiffness=400.0))
     assert choice.measure == "free simulation"
     late = replace(
         drifting, command=drifting.command.part(900, 4900), response=drifting.response.part(900, 4900), segments=()
     )
-    choice = choose_measure(observed_parts([late], 1), model(stiffness=400.0))
+    choice = choose_measure(observe_parts([late], 1), model(stiffness=400.0))
     assert choice.measure == "windows"
     assert "does not begin at rest" in choice.why
 
 
 def test_the_rule_takes_windows_under_a_controller_where_accelerations_alone_were_measured(held: Recording) -> None:
     felt = replace(held, response=replace(held.response, quantity="acceleration", unit="m/s^2"))
-    choice = choose_measure(observed_parts([felt], 1), model(quantity="acceleration"))
+    choice = choose_measure(observe_parts([felt], 1), model(quantity="acceleration"))
     assert choice.measure == "windows"
 
 

@@ -26,7 +26,7 @@ def some_values(effect):
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 def test_what_is_claimed_is_what_is_placed(effect):
     values = some_values(effect)
-    (placed,) = hypothesis_of_claim(Claim(effect, "one", (1,)), [values]).placed_effects()
+    (placed,) = hypothesis_of_claim(Claim(effect, "one", (1,)), [values]).list_placed_effects()
     assert (placed.effect, placed.sites) == (effect, (1,))
     assert dict(placed.values) == pytest.approx(values)
 
@@ -35,7 +35,7 @@ def test_what_is_claimed_is_what_is_placed(effect):
 def test_a_step_never_leaves_what_is_allowed(effect):
     whole = hypothesis_of_claim(Claim(effect, "one", (0,)), [some_values(effect)])
     for far in (-1e9, 1e9):
-        (placed,) = whole.placed_effects(np.full(len(whole.point), far))
+        (placed,) = whole.list_placed_effects(np.full(len(whole.point), far))
         for p in effect.parameters:
             assert p.lower <= placed.values[p.name] <= p.upper
 
@@ -43,7 +43,7 @@ def test_a_step_never_leaves_what_is_allowed(effect):
 def test_every_axis_has_numbers_of_its_own_where_each_is_claimed():
     drag = EFFECTS["viscous_damping"]
     each = hypothesis_of_claim(Claim(drag, "each", (0, 1)), [{p.name: v for p in drag.parameters} for v in (0.5, 0.25)])
-    assert [item.sites for item in each.placed_effects()] == [(0,), (1,)]
+    assert [item.sites for item in each.list_placed_effects()] == [(0,), (1,)]
     assert len(each.parameters) == 2 * sum(not p.fixed for p in drag.parameters)
 
 
@@ -57,14 +57,14 @@ def test_claims_are_put_together_and_taken_away_again():
     less = without_claim(whole, 1)
     expected = combine(parts[0], parts[2])
     assert less.key == expected.key and np.array_equal(less.point, expected.point)
-    assert less.placed_effects() == expected.placed_effects()
+    assert less.list_placed_effects() == expected.list_placed_effects()
     assert [each.effect.name for each in whole.of_claim(1)] == ["extra_mode"]
 
 
 def test_nothing_is_the_beginning_of_all_claims():
     part = hypothesis_of_claim(Claim(EFFECTS["sensor_lag"], "one", (0,)), [some_values(EFFECTS["sensor_lag"])])
-    assert combine(NOTHING, part).placed_effects() == part.placed_effects()
-    assert NOTHING.placed_effects() == ()
+    assert combine(NOTHING, part).list_placed_effects() == part.list_placed_effects()
+    assert NOTHING.list_placed_effects() == ()
 
 
 def evidence_of(context):
@@ -76,7 +76,7 @@ def test_friction_in_the_data_suggests_friction_near_its_level(arena_of):
     rubs = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 0.2}),)
     found = candidates([EFFECTS["coulomb_friction"]], evidence_of(arena_of(rubs)))
     assert 1 <= len(found) <= STARTS_PER_CLAIM
-    assert found[0].placed_effects()[0].values["level"] == pytest.approx(0.2, rel=0.3)
+    assert found[0].list_placed_effects()[0].values["level"] == pytest.approx(0.2, rel=0.3)
 
 
 def test_every_effect_is_suggested_at_every_axis_or_not_at_all(arena_of):
@@ -103,7 +103,7 @@ def test_numbers_that_do_almost_the_same_are_tried_in_place_of_an_effects_own():
         hypothesis_of_claim(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}]),
     ]
     (other,) = similar_hypotheses(combine(combine(parts[0], parts[1]), parts[2]))
-    lag, band, force = other.placed_effects()
+    lag, band, force = other.list_placed_effects()
     assert band.values == pytest.approx({"width": 0.015, "jump": 0.0})
     assert (lag.values["bandwidth"], force.values["force"]) == pytest.approx((60.0, 0.1))
 

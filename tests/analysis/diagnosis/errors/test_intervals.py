@@ -225,7 +225,7 @@ def test_a_number_at_its_bound_has_no_error_there_and_leaves_it_where_the_data_a
     begun = evaluate_fit(jumping, TUNING, np.zeros(1), plain)
     assert standard_errors(jumping, begun, all_of(jumping, begun))[-1] == 0.0
     found, known = finish_fit(jumping, TUNING, begun, lambda at: all_of(jumping, at), lambda: True)
-    jump, error = found.hypothesis.placed_effects()[0].values["jump"], standard_errors(jumping, found, known)[-1]
+    jump, error = found.hypothesis.list_placed_effects()[0].values["jump"], standard_errors(jumping, found, known)[-1]
     assert error > 0.0
     assert jump == pytest.approx(FORCE_N, abs=0.03)
 
@@ -252,7 +252,7 @@ def test_two_numbers_that_act_alike_are_parted_by_the_calibration_alone(quality)
     (record,) = measure.records
     silent = TwoMasses((replace(record, measured=np.zeros((SAMPLES, 1))),), *parts_of(measure), quality=quality)
     added = hypothesis_of_claim(Claim(EFFECTS["added_mass"], "one", (0,)), [{"mass": 0.4}])
-    (played,) = silent.residuals(MODEL, added.placed_effects())
+    (played,) = silent.residuals(MODEL, added.list_placed_effects())
     samples = np.random.default_rng(7).standard_normal((SAMPLES, 1)) - played
     alike = replace(silent, records=(replace(record, measured=samples),))
     far = replace(added, point=np.array([added.parameters[0].coordinate(0.1)]))
@@ -265,7 +265,7 @@ def test_two_numbers_that_act_alike_are_parted_by_the_calibration_alone(quality)
     assert (begun.cost - found.cost) * SAMPLES > 8
     assert found.deviations[0] == pytest.approx(0.0, abs=0.15)
     own, error = standard_errors(alike, found, known)
-    mass = found.hypothesis.placed_effects()[0].values["mass"]
+    mass = found.hypothesis.list_placed_effects()[0].values["mass"]
     assert mass == pytest.approx(0.4, rel=0.06)
     assert (own, mass * error) == (pytest.approx(1.0, rel=0.1), pytest.approx(0.1, rel=0.1))
     assert finish_fit(alike, TUNING, found, at, lambda: True)[0].cost > found.cost - 0.1 / SAMPLES

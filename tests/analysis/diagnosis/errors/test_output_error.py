@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import NOTHING, Claim, combine, hypothesis_of_claim
-from analysis.diagnosis.errors.output_error import bounded_step, evaluate_fit, fit, residuals_to_fit, sensitivity
+from analysis.diagnosis.errors.output_error import evaluate_fit, fit, residuals_to_fit, sensitivity, solve_bounded_step
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.catalogue import EFFECTS
@@ -53,7 +53,7 @@ def test_a_number_that_fits_as_it_is_stays(arena_of):
 @pytest.mark.parametrize("start", [0.05, 0.6])
 def test_friction_is_found_from_far_away(rubbing_arena, start):
     found = recovered(rubbing_arena, alone("coulomb_friction", {"level": start}))
-    assert found.hypothesis.placed_effects()[0].values["level"] == pytest.approx(FRICTION_N, rel=2e-3)
+    assert found.hypothesis.list_placed_effects()[0].values["level"] == pytest.approx(FRICTION_N, rel=2e-3)
     assert rubbing_arena.candidate(found).score.worst_channel < 1.03
 
 
@@ -63,7 +63,7 @@ def test_two_effects_are_found_at_once(arena_of):
         PlacedEffect(EFFECTS["amplifier_lag"], (0,), {"time_constant": LAG_S}),
     )
     both = combine(alone("coulomb_friction", {"level": 0.1}), alone("amplifier_lag", {"time_constant": 1e-3}))
-    rubs, lags = recovered(arena_of(truth), both).hypothesis.placed_effects()
+    rubs, lags = recovered(arena_of(truth), both).hypothesis.list_placed_effects()
     assert rubs.values["level"] == pytest.approx(FRICTION_N, rel=5e-3)
     assert lags.values["time_constant"] == pytest.approx(LAG_S, rel=5e-3)
 
@@ -121,7 +121,7 @@ def test_a_step_within_bounds_is_the_best_one():
         rows = random.normal(size=(12, 4))
         products, rhs = rows.T @ rows, rows.T @ random.normal(size=12)
         low, high = -random.uniform(0, 0.3, 4), random.uniform(0, 0.3, 4)
-        step = bounded_step(products, rhs, low, high)
+        step = solve_bounded_step(products, rhs, low, high)
         assert ((step >= low - 1e-12) & (step <= high + 1e-12)).all()
         free = np.linalg.solve(products, rhs)
         if ((free >= low) & (free <= high)).all():

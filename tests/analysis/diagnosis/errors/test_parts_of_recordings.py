@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import as_force_driven
-from analysis.diagnosis.data.observed_parts import names_of_parts, observed_parts
+from analysis.diagnosis.data.observed_parts import names_of_parts, observe_parts
 from analysis.diagnosis.errors.choose_measure import measure_of
 from equalizer.signals.joining import join
 from equalizer.signals.recording import Recording, Segment
@@ -25,10 +25,10 @@ def test_parts_made_one_after_another_are_compared_apart(held: Recording) -> Non
 def test_a_recording_for_the_test_spares_the_others(held: Recording) -> None:
     fitted = replace(held, segments=(Segment(0, len(held), "slow", role="fit"),))
     tested = replace(held, segments=(Segment(0, len(held), "slow", role="test"),))
-    one, other = observed_parts([fitted, tested], 1)
+    one, other = observe_parts([fitted, tested], 1)
     assert not one.test.any() and (one.fit | one.choose).all()
     assert other.test.all() and not (other.fit | other.choose).any()
-    (alone,) = observed_parts([tested], 1)
+    (alone,) = observe_parts([tested], 1)
     assert alone.fit.any() and alone.choose.any() and alone.test.any()
 
 
@@ -45,5 +45,5 @@ def test_an_imposed_motion_is_turned_round(held: Recording) -> None:
 
 def test_decisions_are_made_by_the_first_periods_of_many(drifting: Recording) -> None:
     repeated = replace(drifting, segments=(Segment(0, 6000, "multisine", 1.0, 500, "fit"),))
-    (record,) = observed_parts([repeated], 1)
+    (record,) = observe_parts([repeated], 1)
     assert np.flatnonzero(record.fit | record.choose)[-1] < 4 * 500

@@ -7,7 +7,7 @@ from analysis.diagnosis.data import motion_smoother
 from analysis.diagnosis.data.motion_smoother import smooth_motion
 from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.choose_measure import measure_by_force
-from analysis.diagnosis.forces.inverse_dynamics import band_motion, required_force
+from analysis.diagnosis.forces.inverse_dynamics import band_motion, compute_required_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.along_motion import force_along
@@ -34,7 +34,7 @@ def _breaks_down(*_of: object) -> None:
 def test_a_sine_needs_the_force_of_the_books() -> None:
     omega = 2 * np.pi * 2.0
     x = 0.03 * np.sin(omega * TIME_S)
-    needed = required_force(body(), band_motion(x[:, None], RATE_HZ, 50.0))
+    needed = compute_required_force(body(), band_motion(x[:, None], RATE_HZ, 50.0))
     wanted = (300.0 - 2.0 * omega**2) * x + 5.0 * 0.03 * omega * np.cos(omega * TIME_S)
     inside = slice(200, -200)
     assert np.allclose(needed.force[inside, 0], wanted[inside], atol=2e-3 * np.abs(wanted).max())
@@ -43,7 +43,7 @@ def test_a_sine_needs_the_force_of_the_books() -> None:
 
 def test_a_steady_slide_needs_its_damping_and_spring() -> None:
     x = 0.1 + 0.2 * TIME_S
-    needed = required_force(body(), band_motion(x[:, None], RATE_HZ, 50.0))
+    needed = compute_required_force(body(), band_motion(x[:, None], RATE_HZ, 50.0))
     assert np.allclose(needed.force[:, 0], 300.0 * x + 5.0 * 0.2, atol=1e-6)
     assert np.allclose(needed.axis_velocity, 0.2, atol=1e-6)
 
@@ -56,7 +56,7 @@ def test_bodies_that_are_not_measured_are_moved_along() -> None:
     force = filter_low_pass(np.random.default_rng(1).standard_normal((4000, 1)), RATE_HZ, 10.0)
     force *= np.clip(np.minimum(TIME_S, TIME_S[::-1]) / 0.5, 0, 1)[:, None]
     moved = simulate_mechanism(two, force, RATE_HZ).response
-    needed = required_force(two, band_motion(moved, RATE_HZ, 60.0)).force
+    needed = compute_required_force(two, band_motion(moved, RATE_HZ, 60.0)).force
     entered = filter_low_pass(force, RATE_HZ, 60.0, late_s=0.5 / RATE_HZ)
     assert np.std((needed - entered)[300:-600]) < 0.01 * np.std(entered)
 

@@ -82,7 +82,7 @@ def test_dry_friction_and_presliding_are_distinguished_by_the_proposed_recording
     (experiment,) = chosen.experiments
     command = experiment.commands
     played = [
-        simulate_mechanism(bench.tuning.model, command, RATE_HZ, each.hypothesis.placed_effects())
+        simulate_mechanism(bench.tuning.model, command, RATE_HZ, each.hypothesis.list_placed_effects())
         for each in (named, rival)
     ]
     truth, other = (np.hstack([each.response, each.position]) for each in played)
@@ -121,14 +121,14 @@ TELLS, HALF = 3 * TELLING_GAIN, 0.6 * TELLING_GAIN
 def test_one_recording_that_tells_every_rival_is_preferred_to_two():
     chosen = choose_set(gains_of([9 * TELLS, 0, TELLS], [0, 9 * TELLS, TELLS]))
     assert words_of(chosen) == [2]
-    assert chosen.told == (0, 1)
+    assert chosen.discriminated == (0, 1)
     assert chosen.gain == pytest.approx(TELLS)
 
 
 def test_rivals_that_no_recording_tells_at_once_need_two():
     chosen = choose_set(gains_of([TELLS, 0, 0], [0, 0, TELLS]))
     assert sorted(words_of(chosen)) == [0, 2]
-    assert chosen.told == (0, 1)
+    assert chosen.discriminated == (0, 1)
 
 
 def test_gains_of_several_recordings_add_up():
@@ -150,7 +150,7 @@ def test_no_more_recordings_are_proposed_than_a_laboratory_would_make():
     small = 0.3 * TELLING_GAIN
     assert choose_set(gains_of([small, small, small, small])).experiments == ()
     chosen = choose_set(gains_of(*np.diag([TELLS] * 5).tolist()))
-    assert len(chosen.experiments) == len(chosen.told) == MOST_TOGETHER
+    assert len(chosen.experiments) == len(chosen.discriminated) == MOST_TOGETHER
 
 
 def test_a_recording_that_no_rival_needs_is_not_proposed():

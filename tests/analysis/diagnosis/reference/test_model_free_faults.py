@@ -32,7 +32,7 @@ def spoiled(given: Recording, change) -> Recording:
 
 def seen(new: Recording, clean: Recording, known=CATALOGUE):
     found = find_sensor_faults([new], [clean], known)
-    return [(each.key[0][0], each.key[0][1], each.placed_effects()[0].values) for each in found]
+    return [(each.key[0][0], each.key[0][1], each.list_placed_effects()[0].values) for each in found]
 
 
 @pytest.mark.parametrize("step", [STEP, 0.05, 0.0])

@@ -12,7 +12,7 @@ from analysis.diagnosis.result.candidate_wording import (
     candidate_title,
     class_sentence,
 )
-from analysis.diagnosis.result.ceiling_wording import ceiling_sentences
+from analysis.diagnosis.result.ceiling_wording import describe_ceiling
 from analysis.diagnosis.result.findings import BalanceErrors
 from analysis.diagnosis.result.wording import effect_title, inseparable_sentence, verdict_sentence
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
@@ -75,7 +75,7 @@ def test_laws_beyond_the_vocabulary_have_nouns_and_units(effect):
     assert effect not in EFFECT_WORDS
     law = LAW_WORDS[effect]
     # The parameters of a sensor are in the unit of what it reads.
-    numbers = set() if law.place == "sensor" else set(law.words.numbers) - set(law.words.shares)
+    numbers = set() if law.place == "sensor" else set(law.words.parameters) - set(law.words.shares)
     assert numbers == set(law.units)
     assert {unit_of(effect, name, system) for name in law.units for system in (LINEAR, ROTATIONAL)} != {"1"}
 
@@ -106,13 +106,13 @@ def test_an_effect_without_a_class_is_called_by_its_own_name():
 
 
 def test_the_share_of_the_ceiling_is_one_of_powers():
-    (said,) = ceiling_sentences((BalanceErrors("x", 0.5, 0.3, 0.1, True),))
+    (said,) = describe_ceiling((BalanceErrors("x", 0.5, 0.3, 0.1, True),))
     assert "alone leave 50 % of the force, and all laws together 10 %" in said
     assert said.endswith("what is named leaves 30 %; that is 67 % of the way.")
-    (nothing,) = ceiling_sentences((BalanceErrors("x", 0.5, 0.5, 0.1, False),))
+    (nothing,) = describe_ceiling((BalanceErrors("x", 0.5, 0.5, 0.1, False),))
     assert nothing.endswith("no law is named.")
-    (best,) = ceiling_sentences((BalanceErrors("x", 0.5, 0.1, 0.1, True),))
+    (best,) = describe_ceiling((BalanceErrors("x", 0.5, 0.1, 0.1, True),))
     assert best.endswith("what is named leaves 10 %, and all laws together leave no less.")
-    assert ceiling_sentences((BalanceErrors("x", 0.5, 0.5, 0.1, False),) * 2)[0].startswith(
+    assert describe_ceiling((BalanceErrors("x", 0.5, 0.5, 0.1, False),) * 2)[0].startswith(
         "In the force balance along x,"
     )

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.diagnose import DiagnosisSettings, diagnose
 from analysis.diagnosis.result.error_table import held_out_stands_still
 from equalizer.effects.catalogue import CATALOGUE
@@ -33,16 +33,16 @@ def stops_at(sample, seed=3):
 @pytest.mark.parametrize(("stop", "still"), [(MOVING, True), (N, False)])
 def test_held_out_samples_at_rest_hold_no_motion(stop, still):
     marked = replace(turning(stops_at(stop)), segments=LAST_QUARTER)
-    assert held_out_stands_still(observed_parts([marked], 1), NOISE) == still
+    assert held_out_stands_still(observe_parts([marked], 1), NOISE) == still
 
 
 def test_without_segments_what_is_held_out_moves():
-    assert not held_out_stands_still(observed_parts([turning(stops_at(MOVING))], 1), NOISE)
+    assert not held_out_stands_still(observe_parts([turning(stops_at(MOVING))], 1), NOISE)
 
 
 def test_a_steady_speed_is_a_motion_though_its_reading_does_not_change():
     speed = np.where(np.arange(N) < MOVING, stops_at(N), 2.0)
-    assert not held_out_stands_still(observed_parts([turning(speed)], 1), NOISE)
+    assert not held_out_stands_still(observe_parts([turning(speed)], 1), NOISE)
 
 
 @pytest.mark.parametrize(
@@ -52,12 +52,12 @@ def test_a_steady_speed_is_a_motion_though_its_reading_does_not_change():
 def test_an_idle_axis_that_only_holds_noise_does_not_move(stop, size, still):
     small = size * np.sin(np.arange(N) / 50) + NOISE * np.random.default_rng(8).standard_normal(N)
     shot = turning(np.stack([stops_at(stop), small], axis=1))
-    assert held_out_stands_still(observed_parts([shot], 1), np.repeat(NOISE, 2)) == still
+    assert held_out_stands_still(observe_parts([shot], 1), np.repeat(NOISE, 2)) == still
 
 
 def test_where_nothing_moves_at_all_nothing_stands_still():
     noise = NOISE * np.random.default_rng(8).standard_normal(N)
-    assert not held_out_stands_still(observed_parts([turning(noise)], 1), NOISE)
+    assert not held_out_stands_still(observe_parts([turning(noise)], 1), NOISE)
 
 
 def test_a_stretch_at_rest_that_is_marked_as_test_stays_and_gives_no_error():

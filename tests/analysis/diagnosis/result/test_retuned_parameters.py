@@ -2,14 +2,14 @@
 
 from dataclasses import replace
 
-from analysis.diagnosis.result.retuned_parameters import MovedParameter, doubtful_sentences, retuned_sentence
+from analysis.diagnosis.result.retuned_parameters import MovedParameter, describe_retuning, doubtful_sentences
 
 MOVED = MovedParameter("damping fx", 0.35, "N s/m", 2.1)
 
 
 def test_numbers_of_the_model_that_moved_too_far_are_doubted():
-    assert retuned_sentence(()) == ""
-    assert retuned_sentence((MOVED,) * 6).endswith("(2.1 standard deviations) and 2 more.")
+    assert describe_retuning(()) == ""
+    assert describe_retuning((MOVED,) * 6).endswith("(2.1 standard deviations) and 2 more.")
     assert doubtful_sentences((MOVED,)) == ()
     (far,) = doubtful_sentences((replace(MOVED, deviations=-3.4),))
     assert far.startswith("The damping fx was moved by 3.4 standard deviations of its calibration: either")
@@ -18,7 +18,7 @@ def test_numbers_of_the_model_that_moved_too_far_are_doubted():
 
 
 def test_a_model_that_was_fitted_here_has_no_calibration_to_leave():
-    assert retuned_sentence((MOVED,), fitted=True) == (
+    assert describe_retuning((MOVED,), fitted=True) == (
         "Fitted once more, these parameters of the first model moved by more than was left open at first: "
         "damping fx +0.350 N s/m."
     )

@@ -7,7 +7,7 @@ from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, parameters_te
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.ceiling_wording import black_box_sentence
 from analysis.diagnosis.result.findings import BlackBox
-from analysis.diagnosis.result.retuned_parameters import MovedParameter, raised_sentence
+from analysis.diagnosis.result.retuned_parameters import MovedParameter, describe_raised_error
 from analysis.diagnosis.result.wording import (
     confirmation_sentence,
     effect_sentence,
@@ -66,7 +66,7 @@ def test_every_effect_of_the_vocabulary_has_a_name_that_people_use_and_reads_out
 def test_words_are_only_for_effects_and_numbers_that_there_are():
     for name, words in EFFECT_WORDS.items():
         known = {p.name for p in EFFECTS_BY_NAME[name].parameters}
-        assert {*words.numbers, *words.shares} <= known
+        assert {*words.parameters, *words.shares} <= known
 
 
 def test_nouns_are_distinguished():
@@ -279,6 +279,6 @@ def test_numbers_that_are_off_by_little_are_said_to_be():
 
 def test_no_name_shines_beside_a_model_that_re_tuning_made_worse():
     worse = Errors(0.158, 0.321, 0.016, 0.01)
-    assert "from 32.1 % to" not in raised_sentence(worse)
-    assert "from 15.8 % to 32.1 %" in raised_sentence(worse)
-    assert raised_sentence(Errors(0.321, 0.158, 0.016, 0.01)) == ""
+    assert "from 32.1 % to" not in describe_raised_error(worse)
+    assert "from 15.8 % to 32.1 %" in describe_raised_error(worse)
+    assert describe_raised_error(Errors(0.321, 0.158, 0.016, 0.01)) == ""

@@ -43,7 +43,7 @@ def test_its_rate_is_nearly_found(evidence, ppm):
     starts = clock_drift_by_trial(CATALOGUE, drifted)
     assert {start.claims[0].effect.name for start in starts} == {"clock_drift"}
     # To a fraction of the period by which it is off at the end.
-    assert starts[0].placed_effects()[0].values["ppm"] == pytest.approx(ppm, abs=600)
+    assert starts[0].list_placed_effects()[0].values["ppm"] == pytest.approx(ppm, abs=600)
 
 
 def test_a_clock_that_runs_right_is_not_suggested(evidence):

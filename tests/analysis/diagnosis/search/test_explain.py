@@ -12,7 +12,7 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.search import explain
 from analysis.diagnosis.search.explain import _look_ahead
 from analysis.diagnosis.search.parsimony import is_worthwhile
-from analysis.diagnosis.search.search import ONLY_REFINES
+from analysis.diagnosis.search.verdict import ONLY_REFINES
 from analysis.diagnosis.settings import ADDED_GAIN, INTERVAL_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect

@@ -135,7 +135,7 @@ def test_a_step_that_was_scored_on_all_samples_has_the_same_profile(rubbing):
 
 def test_an_interval_that_contains_zero_is_corrected_by_the_profile_likelihood(rubbing, monkeypatch):
     found = fitted(rubbing, FRICTION)
-    place, level = len(rubbing.tuning.names), found.after.fitted.hypothesis.placed_effects()[0].values["level"]
+    place, level = len(rubbing.tuning.names), found.after.fitted.hypothesis.list_placed_effects()[0].values["level"]
     plain = final_errors(rubbing, found)
     wide = plain.copy()
     wide[place] = np.log1p(2 / (1.96 * INTERVAL_FACTOR))
@@ -183,6 +183,6 @@ def test_a_jump_that_no_sample_shows_does_not_leave_a_dead_band_open(arena_of):
     found = Explanation(*(dead.with_test_score(each) for each in (base, base, step)), ((step,),), (step,))
     left = keep_identifiable(dead, found, always)
     assert names(left) == ["force_deadband"]
-    placed = left.after.fitted.hypothesis.placed_effects()[0]
+    placed = left.after.fitted.hypothesis.list_placed_effects()[0]
     assert placed.values["jump"] == 0.0
     assert placed.values["width"] == pytest.approx(0.02, rel=0.1)

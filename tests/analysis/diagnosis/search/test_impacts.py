@@ -67,7 +67,7 @@ def told(loose):
 def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
     (claim,) = told.after.fitted.hypothesis.claims
     assert (claim.effect.name, claim.sites) == ("backlash", (AXIS,))
-    values = told.after.fitted.hypothesis.placed_effects()[0].values
+    values = told.after.fitted.hypothesis.list_placed_effects()[0].values
     assert values["gap"] == pytest.approx(GAP_M, rel=0.1)
 
 
@@ -115,7 +115,7 @@ def humming(diagnosed):
 
 def test_a_hum_of_the_sensor_is_named_beside_play(humming):
     assert [each.effect.name for each in humming.after.fitted.hypothesis.claims] == ["backlash", "mains_hum"]
-    played, *_, hum = humming.after.fitted.hypothesis.placed_effects()
+    played, *_, hum = humming.after.fitted.hypothesis.list_placed_effects()
     assert played.values["gap"] == pytest.approx(GAP_M, rel=0.2)
     assert hum.values["frequency"] == pytest.approx(60.0, abs=0.5)
     assert hum.values["amplitude"] == pytest.approx(2.0, rel=0.2)
@@ -133,7 +133,7 @@ def test_a_friction_that_the_search_tried_is_named_beside_play(diagnosed):
     tried = tuple(context.candidate(evaluate_fit(context.measure, context.tuning, at, each)) for each in claims)
     rubbed = explain_impacts(context, replace(found, rounds=(tried,)), floors, CATALOGUE)
     assert [each.effect.name for each in rubbed.after.fitted.hypothesis.claims] == ["backlash", "coulomb_friction"]
-    level = rubbed.after.fitted.hypothesis.placed_effects()[-1].values["level"]
+    level = rubbed.after.fitted.hypothesis.list_placed_effects()[-1].values["level"]
     assert level == pytest.approx(0.3, rel=0.15)
     assert judge(rubbed).verdict == "explained"
 

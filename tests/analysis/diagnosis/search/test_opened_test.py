@@ -7,8 +7,8 @@ import pytest
 from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.search.search import MILDER_TEST_USED
 from analysis.diagnosis.search.search_context import FINER_PARTS, HALVES
+from analysis.diagnosis.search.verdict import MILDER_TEST_USED
 from tests.diagnosed import device
 from tests.lawful import arena_of, law, recorded
 

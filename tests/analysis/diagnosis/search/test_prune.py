@@ -140,7 +140,7 @@ def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, d
     context = arena_of((placed("transport_delay", delay=late),))
     base = retune_alone(context)
     starts = [
-        candidate.placed_effects()[-1].values["delay"]
+        candidate.list_placed_effects()[-1].values["delay"]
         for candidate in candidates(
             [EFFECTS["transport_delay"]], gather_evidence(context.measure, context.tuning, base)[0]
         )
@@ -149,5 +149,5 @@ def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(arena_of, d
     assert any(start > 1 / diagnosed.RATE_HZ for start in starts)
     found = search_effects(context, CATALOGUE, lambda what, share: None).found
     assert names(found) == ["transport_delay"]
-    assert found.after.fitted.hypothesis.placed_effects()[-1].values["delay"] == pytest.approx(late, rel=0.01)
+    assert found.after.fitted.hypothesis.list_placed_effects()[-1].values["delay"] == pytest.approx(late, rel=0.01)
     assert np.nanmax(found.after.score.test) < 1.1

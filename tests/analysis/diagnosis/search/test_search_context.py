@@ -29,7 +29,7 @@ def refined_from(context, width, jump):
 
 
 def test_a_wider_band_with_a_jump_is_found_to_be_a_plain_one(context):
-    (placed,) = refined_from(context, TRUE_N / 0.65, 0.35).hypothesis.placed_effects()
+    (placed,) = refined_from(context, TRUE_N / 0.65, 0.35).hypothesis.list_placed_effects()
     assert placed.values["width"] == pytest.approx(TRUE_N, rel=0.02)
     assert placed.values["jump"] == 0.0
 
@@ -44,5 +44,5 @@ def test_a_number_at_the_end_of_its_range_is_held_there_and_leaves_the_others_su
 
 def test_a_band_that_does_jump_keeps_its_jump(arena_of):
     jumping = arena_of(dead(width=0.1, jump=0.6))
-    (placed,) = refined_from(jumping, 0.1, 0.6).hypothesis.placed_effects()
+    (placed,) = refined_from(jumping, 0.1, 0.6).hypothesis.list_placed_effects()
     assert placed.values["jump"] == pytest.approx(0.6, abs=0.1)

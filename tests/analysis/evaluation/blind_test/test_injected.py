@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.evaluation.blind_test.injected import DETECTABLE, injected_figures, read_outcome, tallies
-from analysis.reports.injected_section import figure_text, injected_section, kind_of
+from analysis.reports.injected_section import figure_text, kind_of, make_injected_section
 
 PLACES = {"sensor_lag": "sensor", "sensor_gain": "sensor", "amplifier_lag": "actuator", "added_mass": "mechanism"}
 
@@ -82,5 +82,5 @@ def test_only_detectable_faults_are_asked_for():
 
 def test_every_miss_and_every_wrong_story_is_listed():
     said = [outcome(), outcome(named=("sensor_gain",)), outcome((), ("added_mass",)), outcome(named=(), change=1.0)]
-    listed = injected_section(said).tables[-1]
+    listed = make_injected_section(said).tables[-1]
     assert [row[1] for row in listed.rows] == ["sensor_lag", "nothing"]

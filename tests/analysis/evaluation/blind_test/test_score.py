@@ -9,8 +9,8 @@ from analysis.evaluation.blind_test.detection import classify_outcome, detection
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
 from analysis.evaluation.blind_test.score import is_miss, score
-from analysis.evaluation.blind_test.share import pooled_share, share, statistic
-from analysis.evaluation.blind_test.wording import answer_text, concealed_text, figure_text
+from analysis.evaluation.blind_test.share import pool_share, share, statistic
+from analysis.evaluation.blind_test.wording import answer_text, describe_concealed, figure_text
 from analysis.figures.blind_test_pictures import blind_test_pictures
 from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -118,10 +118,10 @@ def test_a_right_name_on_another_axis_is_a_miss_where_there_are_several():
 
 def test_what_hangs_together_is_resampled_together():
     whole = [[True] * 10, [False] * 10] * 10
-    found, alone = pooled_share("together", whole), share("alone", [each for group in whole for each in group], bool)
+    found, alone = pool_share("together", whole), share("alone", [each for group in whole for each in group], bool)
     assert found.value == alone.value == 0.5
     assert found.high - found.low > 2 * (alone.high - alone.low)
-    assert pooled_share("none", [[], []]).value is None
+    assert pool_share("none", [[], []]).value is None
 
 
 def test_shares_of_nothing_have_no_value():
@@ -188,6 +188,6 @@ def test_a_bank_of_nothing_has_no_pictures():
 
 
 def test_sentences_say_truth_and_answer():
-    assert concealed_text(PAIR) == "coulomb_friction of x + viscous_damping of x"
+    assert describe_concealed(PAIR) == "coulomb_friction of x + viscous_damping of x"
     assert answer_text(WRONG) == "explained: viscous_damping of x (0.60)"
-    assert concealed_text(CLEAN) == "nothing"
+    assert describe_concealed(CLEAN) == "nothing"

@@ -8,7 +8,7 @@ from scipy.special import ndtr
 
 from analysis.psychophysics.cues.answers_on_delivery import RELYING, answers_on_delivery
 from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
-from analysis.psychophysics.cues.delivered_cues import Cue, delivered_trials
+from analysis.psychophysics.cues.delivered_cues import Cue, select_delivered_trials
 
 TRIALS = 60
 
@@ -41,7 +41,7 @@ def template(simulate):
 
 
 def slope_of(trials):
-    (group,) = delivered_trials(trials)
+    (group,) = select_delivered_trials(trials)
     (found,) = (each for each in answers_on_delivery(group) if each.cue is Cue.INTENSITY)
     return found
 
@@ -52,7 +52,7 @@ def test_a_participant_who_goes_by_strength_is_found_with_the_slope_of_his_noise
     found = slope_of(trials)
     assert found.lower < RELYING < found.upper
     assert found.lower > 0.5
-    assert found.tells
+    assert found.is_conclusive
     said = cue_warnings(cue_findings(trials))[-1]
     assert said.startswith("Within a direction, answers followed what was delivered")
 
@@ -65,16 +65,16 @@ def test_feeling_directions_better_when_they_are_stronger_is_not_taken_for_the_c
 
 def test_a_device_that_repeats_itself_cannot_tell_and_says_so(template):
     still = slope_of(answered(template, 3, scatter_db=0.0, by_strength=1.0))
-    assert still.slope is None and not still.tells
+    assert still.slope is None and not still.is_conclusive
     little = slope_of(answered(template, 3, scatter_db=0.02, by_strength=1.0))
-    assert not little.tells
+    assert not little.is_conclusive
     assert little.upper - little.lower > RELYING
 
 
 def test_who_is_always_right_shows_nothing(template):
     trials = answered(template, 4, scatter_db=1.5, by_strength=0.0)
     sure = [replace(trial, answer=trial.direction_shown, correct=True) for trial in trials]
-    assert not slope_of(sure).tells
+    assert not slope_of(sure).is_conclusive
     assert slope_of(sure).p > 0.9
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB, same_level_difference
 from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
-from analysis.psychophysics.cues.delivered_cues import Cue, cue_gaps, delivered_trials
+from analysis.psychophysics.cues.delivered_cues import Cue, cue_gaps, select_delivered_trials
 from analysis.psychophysics.study_analysis import analyse_study, anova_document
 from analysis.reports.study_report import render_study_report
 
@@ -104,12 +104,12 @@ def test_a_session_with_a_single_direction_is_turned_by_the_angles_of_the_others
         plus = (trial.direction_shown == 1) != (trial.subject == "s02")
         if plus or trial.subject == "s01":
             trials.append(replace(trial, angle_deg=45.0 if plus else -45.0, delivered_mps2=4.0 * trial.level_n))
-    for group in delivered_trials(trials):
+    for group in select_delivered_trials(trials):
         shown = {name: set(group.side[group.person == place]) for place, name in enumerate(group.subjects)}
         assert shown == {"s01": {1.0, -1.0}, "s02": {-1.0}, "s03": {-1.0}}
     # Without the other angle the label is all that is known.
     alone = [replace(trial, angle_deg=45.0) for trial in trials if trial.subject == "s02"]
-    assert {side for group in delivered_trials(alone) for side in group.side} == {-1.0}
+    assert {side for group in select_delivered_trials(alone) for side in group.side} == {-1.0}
 
 
 def test_directions_that_were_played_at_levels_of_their_own_have_no_difference():

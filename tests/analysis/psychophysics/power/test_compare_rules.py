@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from analysis.psychophysics.power.compare_rules import compare_rules, compared_rules, play
+from analysis.psychophysics.power.compare_rules import compare_rules, list_compared_rules, play
 from analysis.psychophysics.power.simulated_study import Crowd
 from analysis.psychophysics.thresholds import thresholds
 from protocols.definition.staircase_rule import BayesianPlacement
@@ -44,7 +44,7 @@ def test_who_guesses_is_said_to_be_above_the_cap_and_who_is_sure_is_not():
 
 def test_thresholds_are_recovered_with_a_smaller_error_per_trial_than_by_the_staircase():
     crowd = Crowd((5.0,), (2.0,))
-    rules = {name: rule for name, rule in compared_rules(PUBLISHED).items() if name in RULES}
+    rules = {name: rule for name, rule in list_compared_rules(PUBLISHED).items() if name in RULES}
     staircase, psi = compare_rules(crowd, rules, 40, 1)
     assert abs(psi.bias_db) < 0.9 and psi.sd_db < 2.5 and psi.runs == 40  # three standard errors of 0.3 dB
     assert staircase.error_per_trial_db > psi.error_per_trial_db > 0

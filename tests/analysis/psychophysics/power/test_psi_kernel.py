@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
-from analysis.psychophysics.power.compare_rules import estimated_db
+from analysis.psychophysics.power.compare_rules import estimate_db
 from analysis.psychophysics.power.psi_kernel import pack_psi, play_psi
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track
@@ -39,7 +39,7 @@ def test_levels_and_estimates_are_those_of_step(rule, threshold_n):
         assert is_finished(rule, state)
         expected = estimate(posterior(state.answered, cap_db), cap_db)
         assert (mean_db, above) == pytest.approx((expected.mean_db, expected.above_cap), abs=1e-9)
-        assert min(mean_db, cap_db) == pytest.approx(estimated_db(rule, state), abs=1e-9)
+        assert min(mean_db, cap_db) == pytest.approx(estimate_db(rule, state), abs=1e-9)
 
 
 def test_a_study_by_psi_has_its_trials_and_unbiased_thresholds():

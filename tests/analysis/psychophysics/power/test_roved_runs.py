@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
-from analysis.psychophysics.power.compare_rules import ComparedPerson, answer_trials, compare_rules, compared_rules
+from analysis.psychophysics.power.compare_rules import ComparedPerson, answer_trials, compare_rules, list_compared_rules
 from analysis.psychophysics.power.felt_delivery import felt_delivery
 from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, _feel_delivery, simulate_study
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack, play_run
@@ -81,7 +81,7 @@ def test_answers_hold_the_levels_that_were_played_and_means_those_of_the_stairca
 
 
 def test_rules_are_compared_as_they_are_played_and_psi_is_not_roved():
-    crowd, rules = Crowd((5.0,), (0.6,)), compared_rules(RULE)
+    crowd, rules = Crowd((5.0,), (0.6,)), list_compared_rules(RULE)
     plain, roved = (compare_rules(replace(crowd, rove_db=width), rules, 10, 3) for width in (0.0, ROVE_DB))
     assert all(a != b for a, b in zip(plain[:3], roved[:3], strict=True))
     assert plain[3:] == roved[3:]

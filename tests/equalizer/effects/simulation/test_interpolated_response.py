@@ -30,7 +30,7 @@ def test_between_samples_a_band_limited_signal_is_what_it_is(frequency_hz):
 
 def test_straight_lines_are_numpys():
     k, values = np.arange(500.0), np.random.default_rng(4).standard_normal((500, 2))
-    read = read_other_times(values, 1 + 2e-3, -3.3, straight=1.0)
+    read = read_other_times(values, 1 + 2e-3, -3.3, linear_share=1.0)
     expected = np.column_stack([np.interp(k * (1 + 2e-3) - 3.3, k, column) for column in values.T])
     np.testing.assert_allclose(read, expected, atol=1e-12)
 

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
-from equalizer.identification.mechanical.mechanical_response import free_response, pole_form, sampled_response
+from equalizer.identification.mechanical.mechanical_response import free_response, pole_form, sample_response
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import Signal
@@ -173,7 +173,7 @@ def test_sampled_responses_agree_with_stepping(two_axes):
         settled = stepped(M, D, K, model.input, model.output, quantity, commands)[-1000:]
         lines = np.arange(2, 300)
         measured = np.fft.rfft(settled, axis=0)[lines] / np.fft.rfft(commands[-1000:, 0])[lines, None]
-        found = sampled_response(model, lines * RATE_HZ / 1000, RATE_HZ, Hold.ZERO_ORDER)[:, :, 0]
+        found = sample_response(model, lines * RATE_HZ / 1000, RATE_HZ, Hold.ZERO_ORDER)[:, :, 0]
         np.testing.assert_allclose(found, measured, atol=2e-3 * np.abs(measured).max())
 
 
@@ -182,7 +182,7 @@ def test_the_sensor_pole_is_the_recursion_of_the_format():
     lagging = replace(model, sensor=SensorLimits(bandwidth_hz=40.0))
     lines = np.array([3.0, 60.0])
     step = 1 - np.exp(-2 * np.pi * 40 / RATE_HZ)
-    ratio = sampled_response(lagging, lines, RATE_HZ, Hold.ZERO_ORDER) / sampled_response(
+    ratio = sample_response(lagging, lines, RATE_HZ, Hold.ZERO_ORDER) / sample_response(
         model, lines, RATE_HZ, Hold.ZERO_ORDER
     )
     expected = step / (1 - (1 - step) * np.exp(-2j * np.pi * lines / RATE_HZ))
@@ -194,7 +194,7 @@ def test_a_whole_sample_of_delay_is_one_turn_of_z():
     lines = np.array([1.0, 70.0])
     late = replace(model, actuator=ActuatorLimits(delay_s=1 / RATE_HZ))
     for hold in Hold:
-        ratio = sampled_response(late, lines, RATE_HZ, hold) / sampled_response(model, lines, RATE_HZ, hold)
+        ratio = sample_response(late, lines, RATE_HZ, hold) / sample_response(model, lines, RATE_HZ, hold)
         np.testing.assert_allclose(ratio[:, 0, 0], np.exp(-2j * np.pi * lines / RATE_HZ))
 
 

@@ -19,7 +19,7 @@ def test_a_rotated_trajectory_is_a_combination_of_nine_solutions(
     trajectory, R = np.random.default_rng(seed).standard_normal((60, 3)), random_rotation(seed)
     basis, right = rotation_basis(gains, trajectory), track(gains, trajectory @ R.T)
     assert difference(basis.forces(R), right.forces) <= 1e-11
-    assert difference(basis.predicted_response(R), right.predicted) <= 1e-11
+    assert difference(basis.predict_response(R), right.predicted) <= 1e-11
 
 
 @settings(max_examples=20, deadline=None)
@@ -48,7 +48,7 @@ def test_a_direction_of_another_shape_is_refused(problem_of):
     with pytest.raises(TrackingError, match=r"shape \(3,\); this basis takes \(3, 3\)"):
         rotation_basis(gains, np.ones((20, 3))).forces(np.ones(3))
     with pytest.raises(TrackingError, match=r"shape \(3, 3\); this basis takes \(3,\)"):
-        normal_basis(gains, np.ones(20)).predicted_response(np.eye(3))
+        normal_basis(gains, np.ones(20)).predict_response(np.eye(3))
 
 
 def test_a_recording_of_three_axes_is_no_recording_along_one(problem_of):

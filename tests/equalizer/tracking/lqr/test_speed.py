@@ -5,7 +5,7 @@ import timeit
 import numpy as np
 import pytest
 
-from equalizer.tracking.lqr.changing_direction import play, turning_transient
+from equalizer.tracking.lqr.changing_direction import make_rotatable_transient, play
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.riccati import backward_gains
 from equalizer.tracking.lqr.rotation import rotation_basis
@@ -54,6 +54,6 @@ def test_a_rotation_is_five_hundred_times_faster(half_a_second, random_rotation)
 
 def test_a_tick_that_turns_takes_less_than_a_microsecond(half_a_second, random_rotation):
     problem, wanted = half_a_second
-    transient = turning_transient(stored_gains(problem, SAMPLES), wanted)
+    transient = make_rotatable_transient(stored_gains(problem, SAMPLES), wanted)
     turns = np.array([random_rotation(k) for k in range(SAMPLES)])
     assert in_one_of_some_tries(lambda: quickest(lambda: play(transient, turns)) <= SAMPLES * 1e-6)

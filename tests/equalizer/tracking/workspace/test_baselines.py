@@ -7,7 +7,12 @@ import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.tracking.feedforward.baselines import baseline_inverses, identified_inverse, raw_estimate, rigid_body
+from equalizer.tracking.feedforward.baselines import (
+    baseline_inverses,
+    make_identified_inverse,
+    raw_estimate,
+    rigid_body,
+)
 from equalizer.tracking.feedforward.quality import measure_quality
 
 LINES = np.arange(5.0, 35.001, 0.1)
@@ -24,7 +29,7 @@ def measured(workspaces, plants):
 @pytest.fixture(scope="module")
 def rows(plants, three, measured, workspaces):
     hand = plants.omega_like(hand=True)
-    held = replace(identified_inverse(workspaces.identified(hand, 9, order=26), LINES), name="in the hand")
+    held = replace(make_identified_inverse(workspaces.identified(hand, 9, order=26), LINES), name="in the hand")
     responses = {
         "centre": plants.omega_like().response(LINES),
         "edge": workspaces.plant(1.0).response(LINES),
@@ -111,6 +116,6 @@ def test_centre_and_hand_over_five_seeds(workspaces, plants):
         found = []
         for seed in range(1, 6):
             model = workspaces.identified(plant, 10 * seed + hand, order=26)
-            reached = measure_quality(truth @ identified_inverse(model, LINES).response)
+            reached = measure_quality(truth @ make_identified_inverse(model, LINES).response)
             found.append((reached.flatness_db, reached.coupling_db, reached.axis_error_deg))
         assert (np.max(found, axis=0) <= limits).all(), (name, found)

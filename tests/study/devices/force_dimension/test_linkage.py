@@ -126,7 +126,7 @@ def test_a_library_without_these_functions_still_drives_the_device(stub, rigs, m
         calibrated()
     handle = stub.opened()
     assert np.isfinite(handle.position_m()).all()
-    handle.let_go()
+    handle.disconnect()
 
 
 def test_grid_and_name_are_checked_before_a_device_is_opened(stub, tmp_path):

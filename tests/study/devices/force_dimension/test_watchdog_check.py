@@ -31,7 +31,7 @@ def handle(stepped_stub):
     handle = stepped_stub.opened()
     handle.enable_force()
     yield handle
-    handle.let_go()
+    handle.disconnect()
 
 
 def proved(stub, handle: Handle, watchdog_s: float = WATCHDOG_S) -> float:

@@ -232,7 +232,7 @@ def test_a_pipe_in_the_place_of_a_ring_holds_up_nothing(tmp_path):
 @pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
 def test_the_ring_of_a_killed_program_is_removed_by_the_next_one(tmp_path, monkeypatch):
     monkeypatch.setattr(telemetry, "_folder", lambda: str(tmp_path))
-    monkeypatch.setattr(telemetry, "LEFT_AFTER_S", -1.0)
+    monkeypatch.setattr(telemetry, "ABANDONED_AFTER_S", -1.0)
     alive = Ring(rows=2)
     program = (
         "import os, sys; from study.devices import telemetry; telemetry._folder = lambda: sys.argv[1];"

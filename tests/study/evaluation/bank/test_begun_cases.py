@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from study.evaluation.bank.begun_cases import begin_case, finished_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import RECORDING, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan, seal_cases
@@ -57,7 +57,7 @@ def test_a_label_of_two_cases_finishes_both(bank):
     shown, hidden, begun = (begin_case(bank) for _ in range(3))
     bank.label(0).write_text(f'{{"proposed": {{"name": "{shown.name}"}}, "drawn": {{"name": "{hidden.name}"}}}}')
     show_case(bank, shown)
-    with finished_cases(bank):
+    with finish_begun_cases(bank):
         new = begin_case(bank)
         show_case(bank, new)
     assert {place.name for place in bank.open.iterdir()} == {shown.name, hidden.name, new.name}

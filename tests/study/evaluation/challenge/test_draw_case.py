@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.signals.recording_checks import recording_problems
+from equalizer.signals.recording_checks import check_recording
 from study.evaluation.challenge.bench import draw_bench
 from study.evaluation.challenge.device import Device, motion
 from study.evaluation.challenge.draw_case import draw_case
@@ -35,7 +35,7 @@ def test_a_draw_repeats_from_its_seed(friction_case):
 
 
 def test_a_case_is_a_sound_recording_with_a_linear_model_and_the_truth(friction_case):
-    assert recording_problems(friction_case.recording) == ()
+    assert check_recording(friction_case.recording) == ()
     assert len(friction_case.recording) == 105_000
     assert friction_case.model.effects == ()
     (truth,) = friction_case.truth

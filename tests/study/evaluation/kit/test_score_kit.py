@@ -86,6 +86,14 @@ def test_a_missing_number_counts_as_outside_its_interval(tmp_path: Path) -> None
     assert [row.inside for row in score.rows] == [False, None, True, None]
 
 
+def test_a_value_of_a_change_without_a_unit_is_compared_with_no_interval(tmp_path: Path) -> None:
+    """A grip force in newtons must not be compared with the hand's mass in kilograms."""
+    table = labels_in(tmp_path, "recording,change,value,note,salt\nrec_01,held_handle,2,grip force in N,a\n")
+    seal_labels(table)
+    said = {"rec_01": diagnosis("hand_impedance")}
+    assert score_kit(table, answered(tmp_path / "d", said), tmp_path / "score.csv").rows[0].inside is None
+
+
 def test_a_rival_that_cannot_be_told_apart_counts(tmp_path: Path) -> None:
     table = labels_in(tmp_path, "recording,change,value,note,salt\nrec_01,magnet_brake,,,a\n")
     seal_labels(table)

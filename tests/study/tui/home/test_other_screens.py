@@ -10,7 +10,7 @@ from protocols.wording.words import Words
 from study.tui.screens.browse import BrowseScreen
 from study.tui.screens.diagnosis import DiagnosisScreen
 from study.tui.screens.home import HomeScreen
-from study.tui.screens.preparing import PreparingScreen, elapsed_words
+from study.tui.screens.preparing import PreparingScreen, describe_elapsed
 from tests.study.tui.home.conftest import messages_of
 
 
@@ -156,6 +156,6 @@ def test_before_the_language_is_known_nothing_is_said(on_screen):
 
 
 def test_elapsed_time_counts_whole_seconds():
-    assert [elapsed_words(s) for s in (0.0, 59.9, 60.0, 3601.0)] == [
+    assert [describe_elapsed(s) for s in (0.0, 59.9, 60.0, 3601.0)] == [
         "0 s so far", "59 s so far", "1 min 0 s so far", "60 min 1 s so far"
     ]  # fmt: skip

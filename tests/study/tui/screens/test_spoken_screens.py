@@ -170,7 +170,7 @@ def test_what_a_stop_tells_is_in_the_language(on_stage, code):
         assert english_in(stage.words, words.own) == []
         assert words["key_quit"] in stage.words
         assert words["key_leave"] in stage.text.splitlines()[-1]
-        stage.app.screen.tell(outcomes.stop_unanswered_panel(words))
+        stage.app.screen.show_outcome(outcomes.stop_unanswered_panel(words))
         await stage.pilot.pause()
         assert english_in(stage.words, words.own) == []
         assert words["stop_do_now"].split(":")[0] in re.sub(r"[\s│┃]+", " ", stage.words)

@@ -25,7 +25,7 @@ class Seat:
     async def pass_time(self, seconds: float) -> None:
         """Of the alarms' clock; the screen then looks, as it does ten times a second."""
         self.clock.sleep(seconds)
-        self.app.screen_stack[1].look()
+        self.app.screen_stack[1].poll()
         await self.pilot.pause()
 
     @property

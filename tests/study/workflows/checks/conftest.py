@@ -15,7 +15,7 @@ from study.store.disk.provenance import sha256_of
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.daily_check import MotionCallbacks, check_on
-from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
+from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on
 
 AS_NEW = {"friction": 0.15, "damping": 1.0, "mode_hz": 60.0, "noise": 0.05}
 QUIET = MotionCallbacks(lambda notice: None, lambda done: None)
@@ -47,7 +47,7 @@ def device_like(stepped_stub):
         rig = stepped_stub.rig()
         plan = RecordingPlan(short(), "omega3", (0.0, 0.0, 0.0), 1, device_folder() / f"{seed}.h5")
         stepped_stub.move(0.0, 0.0, 0.0)
-        with contextlib.closing(SafeDevice(rig, recording_settings(plan), VirtualClock())) as device:
+        with contextlib.closing(SafeDevice(rig, make_recording_settings(plan), VirtualClock())) as device:
             yield device, plan
 
     return made

@@ -110,7 +110,7 @@ def shaken(recording: Recording) -> Recording:
 
 def test_a_baseline_that_tells_too_little_is_refused(device_like, monkeypatch):
     with device_like(1, {}) as (device, plan):
-        assert daily_check._baseline_on(device, plan, QUIET)[0] == "baselines/1.h5"
+        assert daily_check._record_baseline_on(device, plan, QUIET)[0] == "baselines/1.h5"
         good = read_recording(plan.out)
         monkeypatch.setattr(daily_check, "record_on", lambda *_: None)
         for spoil, said in (
@@ -121,7 +121,7 @@ def test_a_baseline_that_tells_too_little_is_refused(device_like, monkeypatch):
         ):
             monkeypatch.setattr(daily_check, "read_recording", lambda _, spoil=spoil: spoil(good))
             with pytest.raises(DeviceError, match=f"was not accepted.*{said}.*accept it again"):
-                daily_check._baseline_on(device, plan, QUIET)
+                daily_check._record_baseline_on(device, plan, QUIET)
 
 
 def test_what_was_played_otherwise_is_not_compared(two_days, device_like, recorded):

@@ -18,7 +18,7 @@ from study.errors import DeviceError
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.daily_check import compare_recordings
-from study.workflows.recording.record_device import RecordingPlan, record_on, recording_settings
+from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on
 
 NEW = Omega3Parameters()
 CENTRE_M = (0.0, 0.0, 0.0)
@@ -40,7 +40,7 @@ def recorded(tmp_path_factory):
         rig = replace(build_omega3(seed, hand=False), parameters=pack_parameters(parameters, False, CENTRE_M))
         out = folder / f"{len(list(folder.iterdir()))}.h5"
         plan = RecordingPlan(read_recording_protocol("daily_check").protocol, "simulated", CENTRE_M, seed, out)
-        with contextlib.closing(SafeDevice(rig, recording_settings(plan), VirtualClock())) as device:
+        with contextlib.closing(SafeDevice(rig, make_recording_settings(plan), VirtualClock())) as device:
             assert record_on(device, plan, lambda done: None).warnings == ()
         return read_recording(plan.out)
 

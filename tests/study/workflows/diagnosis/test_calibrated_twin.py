@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study.cli.main import main
-from study.devices.simulated.own_linkage import simulated_linkage
+from study.devices.simulated.own_linkage import make_simulated_linkage
 from study.errors import ExitCode, StudyError
 from study.store.formats.calibration_file import write_calibration
 from study.store.formats.mechanical_model_file import read_mechanical_model
@@ -38,7 +38,7 @@ def test_the_model_says_how_the_inertia_changes_along_each_axis(folder, capsys):
     assert [(effect.kind, effect.axis) for effect in model.effects] == [
         ("pose_dependent_inertia", "x"), ("pose_dependent_inertia", "z"),
     ]  # fmt: skip
-    linkage, step = simulated_linkage(), 1e-4
+    linkage, step = make_simulated_linkage(), 1e-4
     for effect, axis in zip(model.effects, (0, 2), strict=True):
         aside = step * np.eye(3)[axis]
         before, after = (linkage.at(sign * aside).inertia_kg[axis, axis] for sign in (-1, 1))

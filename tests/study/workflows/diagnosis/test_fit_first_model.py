@@ -162,8 +162,8 @@ def test_the_file_says_which_way_a_command_is_counted(tmp_path):
     model = read_mechanical_model(done.plan.out)
     assert model.input[0, 0] == -1
     assert any("counted against the motion" in remark for remark in done.remarks)
-    assert prediction_error(against, model, "test").as_it_is < 0.02
-    assert prediction_error(plain, model, "test").as_it_is > 1
+    assert prediction_error(against, model, "test").without_gain < 0.02
+    assert prediction_error(plain, model, "test").without_gain > 1
 
 
 def test_the_file_is_accepted_for_a_diagnosis(tmp_path):

@@ -25,9 +25,9 @@ def written(tmp_path):
 def test_the_band_ends_at_the_limit_and_says_how_sure_that_is(written):
     found = band_of_study(written(), 5.0)
     assert found.band_hz == (5.0, 34.7)
-    assert "34.7 Hz (interval: 31.6 Hz to above what was played)" in found.told
-    assert "simulated" not in found.told
-    assert "simulated" in band_of_study(written(population="simulated"), 5.0).told
+    assert "34.7 Hz (interval: 31.6 Hz to above what was played)" in found.origin
+    assert "simulated" not in found.origin
+    assert "simulated" in band_of_study(written(population="simulated"), 5.0).origin
 
 
 @pytest.mark.parametrize(

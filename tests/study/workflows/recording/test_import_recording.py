@@ -126,6 +126,20 @@ def test_of_a_folder_of_other_names_it_is_said_that_they_are_no_parts(tmp_path):
         import_recording(ImportPlan((tmp_path / "fold",), None, tmp_path / "r.h5"))
 
 
+def test_of_recordings_put_one_after_another_it_is_said_which_signals_were_left_out(tmp_path):
+    force = Signal(np.ones((8, 1)), 1000.0, "force", "N", ("fx",))
+    response = Signal(np.ones((8, 1)), 1000.0, "acceleration", "m/s^2", ("ax",))
+    position = Signal(np.zeros((8, 1)), 1000.0, "position", "m", ("x",))
+    write_recording(tmp_path / "a.h5", Recording("rig", force, response, position=position))
+    write_recording(tmp_path / "b.h5", Recording("rig", force, response))
+    files = (tmp_path / "a.h5", tmp_path / "b.h5")
+    done = import_recording(ImportPlan(files, None, tmp_path / "r.h5"))
+    assert done.recording.position is None
+    assert done.notes[-1] == "Left out, because not every recording has it: position."
+    whole = import_recording(ImportPlan((tmp_path / "a.h5", tmp_path / "a.h5"), None, tmp_path / "s.h5"))
+    assert not any("Left out" in note for note in whole.notes)
+
+
 def test_a_table_of_others_is_looked_at_and_read_as_it_is(tmp_path):
     (tmp_path / "a.csv").write_text(TABLE)
     found, notes = read_any_recording(tmp_path / "a.csv")

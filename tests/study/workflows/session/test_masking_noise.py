@@ -59,7 +59,7 @@ def sound(monkeypatch, sitter):
     sound = Sound()
     asks_for_noise(sitter)
     monkeypatch.setattr(
-        conduct_session, "opened_sound", lambda settings, clock, observer: contextlib.nullcontext(sound)
+        conduct_session, "open_masking_sound", lambda settings, clock, observer: contextlib.nullcontext(sound)
     )
     return sound
 
@@ -142,7 +142,7 @@ def test_the_level_is_below_that_of_the_file(monkeypatch):
     monkeypatch.setattr(masking, "masking_sound", open_sound)
     monkeypatch.setattr(masking, "LOOP_S", 1)
     for level_db in (0.0, -20.0):
-        with masking.opened_sound(replace(SETTINGS, level_db=level_db), RealClock(), None) as sound:
+        with masking.open_masking_sound(replace(SETTINGS, level_db=level_db), RealClock(), None) as sound:
             assert sound is not None
         assert sound.closed
     loud, quiet = (np.std(samples.astype(float)) for samples in given)
@@ -153,7 +153,7 @@ def test_nothing_is_opened_where_the_protocol_wants_none_or_no_person_is_there(m
     monkeypatch.setattr(masking, "masking_sound", lambda *arguments: 1 / 0)
     none = ((MaskingSettings(), RealClock(), None), (SETTINGS, VirtualClock(), None), (SETTINGS, RealClock(), "ideal"))
     for settings, clock, observer in none:
-        with masking.opened_sound(settings, clock, observer) as sound:
+        with masking.open_masking_sound(settings, clock, observer) as sound:
             assert sound is None
 
 

@@ -27,7 +27,7 @@ from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.session.end_sitting import end_sitting
 from study.workflows.session.open_session import SessionPlan
-from study.workflows.session.plan_sitting import unfinished_sessions
+from study.workflows.session.plan_sitting import find_unfinished_sessions
 from study.workflows.session.simulated_display import SimulatedDisplay
 from study.workflows.views.list_sessions import session_lines
 from study.workflows.views.view_session import session_view
@@ -152,7 +152,7 @@ def test_every_list_and_page_tells_the_outcome_and_nothing_suggests_to_resume(vi
     validation = validate_file(folder.path)
     assert validation.problems == ()
     assert outcome in validation.kind
-    assert unfinished_sessions(data, "P01", "small") == ()
+    assert find_unfinished_sessions(data, "P01", "small") == ()
     texts = (str(ended.value), str(resumed.value), describe(line), *view.events, str(view.facts))
     assert not any("resume" in text.casefold() or "unfinished" in text for text in texts)
     assert any(TURNED_AWAY[outcome] in text for text in texts)

@@ -38,7 +38,7 @@ def requests():
 
 @pytest.fixture
 def supervisor(device, clock, requests):
-    return SessionSupervisor(device, clock, requests, tell=lambda live: None, buttons=(3, 5))
+    return SessionSupervisor(device, clock, requests, publish=lambda live: None, buttons=(3, 5))
 
 
 def test_a_button_answers_with_its_number_and_its_time(supervisor, pressed, clock):

@@ -11,7 +11,7 @@ from study.session.views.views import Unanswered
 from study.store.sessions.archive import find_session
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
-from study.workflows.views.plan_study import document, lines, planned_studies
+from study.workflows.views.plan_study import document, lines, list_planned_studies
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def begin(sitter, balanced):
 
 
 def only(data, protocol=None, simulated=True):
-    (study,) = planned_studies(data, protocol, simulated)
+    (study,) = list_planned_studies(data, protocol, simulated)
     return study
 
 
@@ -73,7 +73,7 @@ def test_a_second_session_of_a_participant_counts_once_by_the_furthest(sitter, b
 def test_people_and_simulated_participants_are_planned_apart(sitter, begin):
     begin("S01")
     with pytest.raises(WrongUseError, match="no study to plan"):
-        planned_studies(sitter.data, None, simulated=False)
+        list_planned_studies(sitter.data, None, simulated=False)
     begin("P07", observer=None)
     assert [who.code for who in only(sitter.data, simulated=False).plan.participants] == ["P07"]
     assert [who.code for who in only(sitter.data).plan.participants] == ["S01"]
@@ -98,12 +98,12 @@ def test_where_all_logs_are_gone_the_protocol_is_asked_for(sitter, begin):
     begin("P01")
     withdraw(sitter.data, plan_withdrawal(find_session("P01_001", sitter.data)), "2026-01-01T00:00:00+00:00")
     with pytest.raises(WrongUseError, match="--protocol"):
-        planned_studies(sitter.data, None, simulated=True)
+        list_planned_studies(sitter.data, None, simulated=True)
 
 
 def test_the_document_holds_the_same_facts(sitter, begin):
     begin("P01", to_the_end=True)
-    (study,) = document(planned_studies(sitter.data, None, simulated=True))["studies"]
+    (study,) = document(list_planned_studies(sitter.data, None, simulated=True))["studies"]
     assert (study["planned"], study["done"], study["begun"], study["left_out"]) == (4, 1, 0, 0)
     assert [order["needed"] for order in study["orders"]] == [1, 2]
     assert study["next"] == {"code": "P02", "number": 1, "frequencies_hz": [15.0, 5.0], "swapped": False}

@@ -15,7 +15,7 @@ from study.errors import StudyError
 from study.regular_file import open_regular
 from study.workflows.views import stream_session as module
 from study.workflows.views.lsl_outlets import MarkerOutlet, source_id
-from study.workflows.views.stream_session import FRESH_S, SideTasks, measured_offset_s, stream_session
+from study.workflows.views.stream_session import FRESH_S, SideTasks, measure_offset_s, stream_session
 
 OFFSET_S = 1000.25
 
@@ -140,7 +140,7 @@ def test_an_interrupted_reading_of_the_clocks_does_not_count():
         def clock_s(self) -> float:
             return 100.0
 
-    assert measured_offset_s(Theirs(), lambda: next(times)) == pytest.approx(100.0 - 1.0005)
+    assert measure_offset_s(Theirs(), lambda: next(times)) == pytest.approx(100.0 - 1.0005)
 
 
 @pytest.mark.parametrize("after", [b"", line("note_taken", text="he said session_closed")])

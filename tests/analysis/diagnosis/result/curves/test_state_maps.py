@@ -6,7 +6,7 @@ import pytest
 from analysis.diagnosis.balance.judge_laws import judge_laws
 from analysis.diagnosis.balance.motion import motions_of
 from analysis.diagnosis.balance.structures import search_structures
-from analysis.diagnosis.data.observed_parts import observed_parts
+from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
 from analysis.diagnosis.result.candidates import balance_errors, with_balances
 from analysis.diagnosis.result.curves.state_maps import NOT_CONFIRMED, state_maps
@@ -39,7 +39,7 @@ def rubbing(level):
 
 def seen(level, without=frozenset()):
     recording = rubbing(level)
-    motions = motions_of(observed_parts((recording,), 1))
+    motions = motions_of(observe_parts((recording,), 1))
     balance = judge_laws(search_structures(motions, 0, False, without, always))
     return balance, state_maps(NOTHING, (balance,), (), recording), recording
 

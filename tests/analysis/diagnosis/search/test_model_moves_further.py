@@ -1,0 +1,62 @@
+"""A model whose parameters are off by more than its calibration says is moved further, where nothing else explains."""
+
+from dataclasses import replace
+
+import pytest
+
+from analysis.diagnosis.diagnose import diagnose
+from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.search.verdict import MODEL_MOVED
+from analysis.diagnosis.settings import RETUNING_BOUND, WIDER_RETUNING_BOUND
+from equalizer.effects.catalogue import CATALOGUE, EFFECTS
+from equalizer.effects.effect import PlacedEffect
+from tests.diagnosed import FRICTION_N, RUBBING, device, recorded
+
+TRIED = ("coulomb_friction", "added_mass", "force_deadband")
+SETTINGS = DiagnosisSettings(without=tuple(e.name for e in CATALOGUE if e.name not in TRIED), discovery=False)
+
+
+def off_by(deviations):
+    """The device's model with a stiffness that is off by so many standard deviations of its calibration."""
+    model = device(1)
+    assert model.tolerance is not None
+    return replace(model, stiffness=model.stiffness + deviations * model.tolerance.stiffness_n_per_m)
+
+
+def diagnosed_with(model, effects=RUBBING):
+    return diagnose([recorded(1, effects)], model, SETTINGS, map, lambda said, share: None)
+
+
+@pytest.fixture(scope="module")
+def far():
+    return diagnosed_with(off_by(9.0))
+
+
+def test_friction_is_found_beside_a_stiffness_far_from_its_calibration(far):
+    assert far.diagnosis.verdict == "explained"
+    (named,) = far.diagnosis.effects
+    assert named.effect == "coulomb_friction"
+    assert named.parameters["level"].value == pytest.approx(FRICTION_N, rel=0.05)
+    deviations = dict(zip(far.tuning.names, far.explanation.after.fitted.deviations, strict=True))
+    assert deviations["stiffness fx"] == pytest.approx(-9.0, abs=0.5)
+
+
+def test_what_was_moved_is_said(far):
+    assert MODEL_MOVED in far.remarks
+    assert far.tuning.bound == WIDER_RETUNING_BOUND
+
+
+def test_beyond_the_wider_bound_nothing_is_explained():
+    found = diagnosed_with(off_by(3 * WIDER_RETUNING_BOUND))
+    assert found.diagnosis.verdict != "explained"
+    assert MODEL_MOVED not in found.remarks
+    assert found.tuning.bound == RETUNING_BOUND
+
+
+def test_an_effect_that_a_model_could_take_up_is_named_first():
+    tolerance = device(1).tolerance
+    assert tolerance is not None
+    heavier = PlacedEffect(EFFECTS["added_mass"], (0,), {"mass": 8.0 * tolerance.mass_kg})
+    found = diagnosed_with(device(1), (heavier,))
+    assert [named.effect for named in found.diagnosis.effects] == ["added_mass"]
+    assert found.tuning.bound == RETUNING_BOUND
