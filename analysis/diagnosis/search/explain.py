@@ -43,7 +43,6 @@ from analysis.diagnosis.settings import (
     MOST_EFFECTS,
     NOISE_ALONE,
     REACHES_NOISE,
-    SEARCH_ON,
 )
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
@@ -185,8 +184,7 @@ def is_worth_searching(context: SearchContext, found: Explanation, base: FittedC
         if judged_whole and len(base.fitted.hypothesis.claims) > 1 and leaves_little(found.retuned, base):
             return False
         beyond = 1.0 if context.references is None else context.references.beyond
-        # Opened samples are few among the others, and shown to hold a mismatch.
-        return base.score.worst_channel > (NOISE_ALONE if context.opened else SEARCH_ON) * beyond
+        return base.score.worst_channel > NOISE_ALONE * beyond
     surprised = bool(np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     return surprised or context.references is not None or base.score.worst_channel > NOISE_ALONE
 

@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.explain import Explanation, is_worth_searching, retune_alone
+from analysis.diagnosis.search.explain import Explanation, explain, is_worth_searching, retune_alone
 from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little
 from analysis.diagnosis.search.revise_selection import drop_needless, exchange_effects, exchange_for_relatives
 from analysis.diagnosis.search.search import prune
@@ -21,6 +22,12 @@ LIMIT_N, LAG_HZ = 1.3, 60.0
 
 def quiet(said, share):
     pass
+
+
+def with_error(candidate, error):
+    """The candidate with the same error, times the noise, in all channels."""
+    same = np.full(len(candidate.score.fit), error)
+    return replace(candidate, score=replace(candidate.score, fit=same, choose=same))
 
 
 def claim(name, **values):
@@ -202,6 +209,32 @@ def test_a_third_goes_though_it_shows_where_two_leave_as_little_as_laws_of_real_
     # Nor is one of the two exchanged.
     pair = replace(found, after=context.with_test_score(two), steps=found.steps[:2], rounds=found.rounds[:2])
     assert exchange_effects(context, pair, list(EFFECTS.values()), quiet, always) is pair
+
+
+def test_a_second_effect_is_looked_for_where_more_than_noise_is_left(limited_and_late):
+    found = found_of(limited_and_late, claim("force_saturation", limit=LIMIT_N))
+    assert not is_worth_searching(limited_and_late, found, with_error(found.steps[0], 1.02))
+    assert is_worth_searching(limited_and_late, found, with_error(found.steps[0], 1.08))
+
+
+def test_of_a_small_remainder_an_effect_must_take_half(limited_and_late):
+    (step,) = found_of(limited_and_late, claim("force_saturation", limit=LIMIT_N)).steps
+    assert not is_worthwhile(with_error(step, 1.10), with_error(step, 1.07))
+    assert is_worthwhile(with_error(step, 1.10), with_error(step, 1.02))
+    # Of a large one, a smaller share is enough.
+    assert is_worthwhile(with_error(step, 3.0), with_error(step, 2.0))
+
+
+def test_no_fourth_effect_is_looked_for_beside_three_that_are_taken_over(limited_and_late):
+    found = found_of(
+        limited_and_late,
+        claim("coulomb_friction", level=0.01),
+        claim("hardening_stiffness", k3=10.0),
+        claim("sensor_lag", bandwidth=900.0),
+    )
+    again = explain(replace(limited_and_late, opened=True), [], quiet, begun=found.rounds)
+    assert again.after.score.worst_channel > SEARCH_ON
+    assert [step.newest for step in again.steps] == [step.newest for step in found.steps]
 
 
 def test_the_last_goes_where_it_only_led_the_others_out_of_a_local_minimum(limited_and_late):
