@@ -103,7 +103,6 @@ SHORT_SHARE = 0.7  # of the samples, above which the whole is simulated at once;
 MOST_EFFECTS = 3
 NOISE_ALONE = 1.05  # error that counts as noise alone
 HELD_OUT_SURPRISE = 1.15  # held-out error of the re-tuned model from which an effect is looked for all the same
-SEARCH_ON = 1.12  # error from which a further effect is looked for; principle: laws of real physics are never exact
 ADDED_SHARE = 0.15  # of what is left above the noise that an effect must take to be added,
 ADDED_GAIN = 0.003  # and the least gain
 

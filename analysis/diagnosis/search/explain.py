@@ -12,7 +12,8 @@ Fits are compared by the log error power, a log-likelihood in which each channel
    free (`screening`); where the drive repeats, on one period of each segment (`short_recordings`).
 4. The most promising are fitted, the best of them until convergence (`compare_candidates`).
 5. Of candidates equal within the errors, the most parsimonious is taken (`parsimony`).
-6. It is added if it removes at least `ADDED_SHARE` of the error that is left above the noise. Then the next effect is
+6. It is added if it removes at least `ADDED_SHARE` of the error that is left above the noise; where no more is left
+   than right laws leave of a real device (`EXPLAINED_ERROR`), half of the worst channel's. Then the next effect is
    looked for, up to `MOST_EFFECTS`. Two strong effects may hide each other: where the best alone removes less, it is
    added with a second one if both remove twice that share.
 

@@ -28,7 +28,6 @@ from analysis.diagnosis.settings import (
     REFINED_GAIN,
     REFINED_MOST_GAIN,
     REFINED_SHARE,
-    SEARCH_ON,
 )
 from equalizer.effects.effect import Effect
 
@@ -136,7 +135,7 @@ def is_worthwhile(base: FittedCandidate, better: FittedCandidate) -> bool:
     """Whether an effect lowers the error enough to be added. Where only the worst channel is above the noise, and not
     the mean over channels, or no more is left than a right law leaves, its logarithm must fall by half."""
     gained, over = base.score.mean_log_error - better.score.mean_log_error, np.log(base.score.worst_channel)
-    little = excess(base) == 0 or base.score.worst_channel <= SEARCH_ON
+    little = excess(base) == 0 or base.score.worst_channel <= EXPLAINED_ERROR
     if little and over > np.log(NOISE_ALONE) and np.log(better.score.worst_channel) > over / 2:
         return False
     return gained > max(ADDED_SHARE * excess(base), ADDED_GAIN)

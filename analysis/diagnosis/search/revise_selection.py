@@ -26,7 +26,7 @@ from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little, pl
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
 from analysis.diagnosis.search.verdict import as_good_as_noise, shares_taken, worth_naming
-from analysis.diagnosis.settings import LAST_EFFECT_SHARE, SEARCH_ON
+from analysis.diagnosis.settings import EXPLAINED_ERROR, LAST_EFFECT_SHARE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 
@@ -154,7 +154,7 @@ def _with_first_at_end(context: SearchContext, candidate: FittedCandidate) -> Fi
 def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBudget) -> bool:
     """Whether there are two effects that are not fixed and leave more than noise, and time."""
     fixed = context.certain or context.references is not None or found.ended_early or found.barred
-    more = len(found.steps) > 1 and found.after.score.worst_channel > SEARCH_ON
+    more = len(found.steps) > 1 and found.after.score.worst_channel > EXPLAINED_ERROR
     return not fixed and more and time_left()
 
 

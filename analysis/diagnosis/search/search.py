@@ -11,8 +11,9 @@ Theory of operation.
 3. `verdict.judge` compares the held-out errors, in units of the noise, with limits: on samples that neither fitted nor
    chose anything, a wrong explanation has no advantage over a right one.
 4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), the
-   search is repeated with a part of them opened: all but the loudest segments, else half of each stretch.
-   What it finds must be confirmed by the part that is still held out.
+   search is repeated with a part of them opened: all but the loudest segments, else half of each stretch, or every
+   other of more parts, the finest where nothing is found in coarser ones. What it finds must be confirmed by the part
+   that is still held out.
 5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`): before a second
    effect is looked for, as a law that alone explains is a shorter description than two effects, and at the end. A law
    that was found early and leaves a part is kept where the rest of the search names nothing.
