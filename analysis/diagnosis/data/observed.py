@@ -47,11 +47,18 @@ class Observed:
             choose[chosen:stop] = True
         return replace(self, fit=fit, choose=choose, test=self.test & ~opened)
 
+    def longest_held_out(self) -> int:
+        """Samples of the longest held-out stretch; 0 where nothing is held out."""
+        return max((stop - start for start, stop in self._held_out_stretches()), default=0)
+
+    def _held_out_stretches(self) -> list[tuple[int, int]]:
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.test.astype(np.int8), [0]]))).reshape(-1, 2)
+        return [(int(start), int(stop)) for start, stop in edges]
+
     def every_other_part(self, parts: int) -> Mask:
         """(n,): the first, third … of so many equal parts of each held-out stretch."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.test.astype(np.int8), [0]]))).reshape(-1, 2)
         found = np.zeros(len(self.test), dtype=np.bool_)
-        for start, stop in edges.tolist():
+        for start, stop in self._held_out_stretches():
             found[start:stop] = (np.arange(stop - start) * parts // (stop - start)) % 2 == 0
         return found
 

@@ -40,7 +40,6 @@ from analysis.diagnosis.search.time_budget import OutOfTimeError, always, limit_
 from analysis.diagnosis.settings import (
     ADDED_GAIN,
     ADDED_SHARE,
-    EXPLAINED_ERROR,
     HELD_OUT_SURPRISE,
     MOST_EFFECTS,
     NOISE_ALONE,
@@ -185,9 +184,7 @@ def is_worth_searching(context: SearchContext, found: Explanation, base: FittedC
         judged_whole = context.references is None and not context.opened
         if judged_whole and len(base.fitted.hypothesis.claims) > 1 and leaves_little(found.retuned, base):
             return False
-        # What was learned on reference recordings is no noise: a right law leaves more beside it.
-        learned = context.references
-        return base.score.worst_channel > (NOISE_ALONE if learned is None else EXPLAINED_ERROR * learned.beyond)
+        return base.score.worst_channel > context.least_left
     surprised = bool(np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     return surprised or context.references is not None or base.score.worst_channel > NOISE_ALONE
 

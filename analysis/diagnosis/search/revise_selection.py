@@ -81,6 +81,16 @@ def drop_needless(context: SearchContext, found: Explanation, time_left: TimeBud
     return min(enough, key=lambda others: others.after.score.mean_log_error, default=found)
 
 
+def drop_unconfirmed(context: SearchContext, found: Explanation) -> Explanation:
+    """Drop a last effect that was found in a remainder as small as right laws leave of a real device, and that the
+    held-out samples do not confirm: with it they show no less."""
+    while len(found.steps) > 1 and found.steps[-2].score.worst_channel <= EXPLAINED_ERROR:
+        if found.after.held_out < context.with_test_score(found.steps[-2]).held_out or np.isinf(found.after.held_out):
+            break
+        found = without_effect(context, found, len(found.steps) - 1)
+    return found
+
+
 def drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
     """Drop last effects that take little and leave more than noise."""
     while len(found.steps) > 1 and not as_good_as_noise(found):
