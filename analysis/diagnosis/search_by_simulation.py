@@ -11,7 +11,7 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.search import HUM, Beyond, search_effects
+from analysis.diagnosis.search.search import HUM, Beyond, move_model_further, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import SearchResult, judge
 from analysis.diagnosis.types import Mapper, Progress
@@ -142,7 +142,11 @@ def _search(
 
         laws = LawSearch(progress, settings.time_left)
         beyond = Beyond(_unless_hum(laws.add_short), _unless_hum(laws.add_any))
-    return SearchOutcome(search_effects(context, catalogue, progress, settings.time_left, beyond), CleanFloor())
+    found = search_effects(context, catalogue, progress, settings.time_left, beyond)
+    # A model that was fitted to the recordings has no calibration to leave.
+    if not settings.fitted:
+        found = move_model_further(context, found, catalogue, progress, settings.time_left)
+    return SearchOutcome(found, CleanFloor())
 
 
 def _unless_hum(add_laws: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:

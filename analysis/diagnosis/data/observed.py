@@ -46,6 +46,10 @@ class Observed:
             choose[chosen:stop] = True
         return replace(self, fit=fit, choose=choose, test=self.test & ~opened)
 
+    def longest_held_out(self) -> int:
+        """Samples of the longest held-out stretch; 0 where nothing is held out."""
+        return max((stop - start for start, stop in runs_of(self.test)), default=0)
+
     def every_other_part(self, parts: int) -> Mask:
         """(n,): the first, third … of so many equal parts of each held-out stretch."""
         found = np.zeros(len(self.test), dtype=np.bool_)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import eigh, null_space
+from scipy.linalg import eigh, eigvalsh, null_space
 
 from analysis.diagnosis.settings import (
     AT_RETUNING_BOUND,
@@ -25,6 +25,10 @@ from equalizer.signals.signal import FloatArray
 UNSTATED = Tolerance(modes=UNSTATED_MODES)
 DAMPING_PER_MODES = 10.0
 """Relative uncertainty of a mode's damping over that of its frequency."""
+
+
+ROUNDING = 1e-9
+"""Share of a matrix's largest element by which an eigenvalue may be negative."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +54,16 @@ class Tuning:
     def is_at_bound(self, deviations: FloatArray) -> bool:
         """Whether a parameter has moved as far as it may. deviations: (parameters,)"""
         return bool(np.abs(deviations).max(initial=0.0) >= AT_RETUNING_BOUND * self.bound)
+
+    def is_possible(self, deviations: FloatArray) -> bool:
+        """Whether mass, damping and stiffness with these deviations (parameters,) are no less definite than those of
+        the given model: beyond the calibration a parameter may vanish or change its sign."""
+        tuned = self.tune(deviations)
+        for part, given in zip(_matrices(tuned), _matrices(self.model), strict=True):
+            least, before = (float(eigvalsh((matrix + matrix.T) / 2)[0]) for matrix in (part, given))
+            if least < min(before, 0.0) - ROUNDING * float(np.abs(given).max()):
+                return False
+        return True
 
     def values(self, deviations: FloatArray) -> FloatArray:
         """(parameters,): deviations, in standard deviations, as changes of the parameters, SI or relative."""
@@ -92,6 +106,10 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
         tuple(unit for unit in units for _ in pairs) + ("1",) * (3 * len(modes)),
         lambda deviations: _tune(model, split, pairs, np.asarray(deviations) * deviation),
     )
+
+
+def _matrices(model: MechanicalModel) -> tuple[FloatArray, FloatArray, FloatArray]:
+    return model.mass, model.damping, model.stiffness
 
 
 @dataclass(frozen=True, slots=True, eq=False)

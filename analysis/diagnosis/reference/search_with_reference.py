@@ -78,7 +78,8 @@ def _search_by_size(
 ) -> SearchResult:
     wide = replace(learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels))
     plain = count_as_noise(context.whole, wide)
-    seen = search_effects(replace(context, measure=plain.shorten(), whole=plain), catalogue, progress, time_left)
+    beside = replace(context, measure=plain.shorten(), whole=plain, least_left=EXPLAINED_ERROR)
+    seen = search_effects(beside, catalogue, progress, time_left)
     back = count_as_noise(context.whole, learned.floor).with_records(seen.context.whole.records)
     own = replace(context, measure=back.shorten(), whole=back)
     return replace(seen, context=own, found=_refit_by(own, seen.found))
@@ -93,7 +94,11 @@ def _search_by_contrast(
 ) -> SearchResult:
     plain = count_as_noise(context.whole, learned.floor)
     whole = learned.noise_measure(plain, context.tuning.model)
-    beside = replace(context, measure=whole.shorten(), whole=whole, references=learned.references)
+    # What was learned is no noise: a right law leaves more beside it.
+    least_left = EXPLAINED_ERROR * learned.references.beyond
+    beside = replace(
+        context, measure=whole.shorten(), whole=whole, references=learned.references, least_left=least_left
+    )
     seen = search_effects(beside, catalogue, progress, time_left)
     plain = plain.with_records(seen.context.whole.records)
     back = replace(context, measure=plain.shorten(), whole=plain)

@@ -12,7 +12,8 @@ Fits are compared by the log error power, a log-likelihood in which each channel
    free (`screening`); where the drive repeats, on one period of each segment (`short_recordings`).
 4. The most promising are fitted, the best of them until convergence (`compare_candidates`).
 5. Of candidates equal within the errors, the most parsimonious is taken (`parsimony`).
-6. It is added if it removes at least `ADDED_SHARE` of the error that is left above the noise. Then the next effect is
+6. It is added if it removes at least `ADDED_SHARE` of the error that is left above the noise; where no more is left
+   than right laws leave of a real device (`EXPLAINED_ERROR`), half of the worst channel's. Then the next effect is
    looked for, up to `MOST_EFFECTS`. Two strong effects may hide each other: where the best alone removes less, it is
    added with a second one if both remove twice that share.
 
@@ -43,7 +44,6 @@ from analysis.diagnosis.settings import (
     MOST_EFFECTS,
     NOISE_ALONE,
     REACHES_NOISE,
-    SEARCH_ON,
 )
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
@@ -184,9 +184,7 @@ def is_worth_searching(context: SearchContext, found: Explanation, base: FittedC
         judged_whole = context.references is None and not context.opened
         if judged_whole and len(base.fitted.hypothesis.claims) > 1 and leaves_little(found.retuned, base):
             return False
-        beyond = 1.0 if context.references is None else context.references.beyond
-        # Opened samples are few among the others, and shown to hold a mismatch.
-        return base.score.worst_channel > (NOISE_ALONE if context.opened else SEARCH_ON) * beyond
+        return base.score.worst_channel > context.least_left
     surprised = bool(np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)
     return surprised or context.references is not None or base.score.worst_channel > NOISE_ALONE
 

@@ -133,9 +133,10 @@ def inseparable(best: FittedCandidate, other: FittedCandidate) -> bool:
 
 def is_worthwhile(base: FittedCandidate, better: FittedCandidate) -> bool:
     """Whether an effect lowers the error enough to be added. Where only the worst channel is above the noise, and not
-    the mean over channels, its logarithm must fall by half."""
+    the mean over channels, or no more is left than a right law leaves, its logarithm must fall by half."""
     gained, over = base.score.mean_log_error - better.score.mean_log_error, np.log(base.score.worst_channel)
-    if excess(base) == 0 and over > np.log(NOISE_ALONE) and np.log(better.score.worst_channel) > over / 2:
+    little = excess(base) == 0 or base.score.worst_channel <= EXPLAINED_ERROR
+    if little and over > np.log(NOISE_ALONE) and np.log(better.score.worst_channel) > over / 2:
         return False
     return gained > max(ADDED_SHARE * excess(base), ADDED_GAIN)
 

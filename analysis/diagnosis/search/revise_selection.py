@@ -26,7 +26,7 @@ from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little, pl
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
 from analysis.diagnosis.search.verdict import as_good_as_noise, shares_taken, worth_naming
-from analysis.diagnosis.settings import LAST_EFFECT_SHARE, SEARCH_ON
+from analysis.diagnosis.settings import EXPLAINED_ERROR, LAST_EFFECT_SHARE
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 
@@ -79,6 +79,16 @@ def drop_needless(context: SearchContext, found: Explanation, time_left: TimeBud
         if not time_left():
             break
     return min(enough, key=lambda others: others.after.score.mean_log_error, default=found)
+
+
+def drop_unconfirmed(context: SearchContext, found: Explanation) -> Explanation:
+    """Drop a last effect that was found in a remainder as small as right laws leave of a real device, and that the
+    held-out samples do not confirm: with it they show no less."""
+    while len(found.steps) > 1 and found.steps[-2].score.worst_channel <= EXPLAINED_ERROR:
+        if found.after.held_out < context.with_test_score(found.steps[-2]).held_out or np.isinf(found.after.held_out):
+            break
+        found = without_effect(context, found, len(found.steps) - 1)
+    return found
 
 
 def drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
@@ -154,7 +164,7 @@ def _with_first_at_end(context: SearchContext, candidate: FittedCandidate) -> Fi
 def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBudget) -> bool:
     """Whether there are two effects that are not fixed and leave more than noise, and time."""
     fixed = context.certain or context.references is not None or found.ended_early or found.barred
-    more = len(found.steps) > 1 and found.after.score.worst_channel > SEARCH_ON
+    more = len(found.steps) > 1 and found.after.score.worst_channel > EXPLAINED_ERROR
     return not fixed and more and time_left()
 
 

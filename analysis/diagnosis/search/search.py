@@ -11,14 +11,15 @@ Theory of operation.
 3. `verdict.judge` compares the held-out errors, in units of the noise, with limits: on samples that neither fitted nor
    chose anything, a wrong explanation has no advantage over a right one.
 4. Where only the held-out samples show a mismatch (such as an end stop that only the loudest segment reaches), the
-   search is repeated with a part of them opened: all but the loudest segments, else half of each stretch.
-   What it finds must be confirmed by the part that is still held out.
+   search is repeated with a part of them opened: all but the loudest segments, else half of each stretch, or every
+   other of more parts, the finest where nothing is found in coarser ones. What it finds must be confirmed by the part
+   that is still held out.
 5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`): before a second
    effect is looked for, as a law that alone explains is a shorter description than two effects, and at the end. A law
    that was found early and leaves a part is kept where the rest of the search names nothing.
 6. Where that still leaves a mismatch, or needs three effects, and a parameter of the model is at its bound, the search
-   is repeated with a wider one, and taken if it explains, by fewer effects: a model that was fitted to this device has
-   the missing physics as a bias.
+   is repeated with a wider one (`move_model_further`): a model that was fitted to this device has the missing physics
+   as a bias. Its result is taken if it explains what the first does not, or by fewer effects.
 
 Reference recordings of the intact device: see `reference/search_with_reference`. Literature: Hastie, Tibshirani and
 Friedman, The Elements of Statistical Learning (2009), section 7.2 (training, validation, test), 3.3 (stepwise).
@@ -26,6 +27,8 @@ Friedman, The Elements of Statistical Learning (2009), section 7.2 (training, va
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.output_error import evaluate_fit
@@ -37,6 +40,7 @@ from analysis.diagnosis.search.parsimony import leaves_far_less
 from analysis.diagnosis.search.revise_selection import (
     drop_needless,
     drop_negligible,
+    drop_unconfirmed,
     exchange_effects,
     exchange_for_relatives,
 )
@@ -59,7 +63,9 @@ from analysis.diagnosis.search.verdict import (
     SearchResult,
     as_good_as_noise,
     confirms_addition,
+    is_plainer,
     judge,
+    may_move_further,
 )
 from analysis.diagnosis.settings import EXPLAINED_ERROR, MOST_EFFECTS
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -74,7 +80,7 @@ def prune(context: SearchContext, found: Explanation, time_left: TimeBudget) -> 
     if found.statistic is not None or context.certain:
         return found
     if len(found.steps) > 1:
-        found = drop_needless(context, found, time_left)
+        found = drop_unconfirmed(context, drop_needless(context, found, time_left))
     if context.references is None:
         found = drop_negligible(context, found)
     return keep_identifiable(context, found, time_left)
@@ -99,31 +105,7 @@ def search_effects(
     time_left: TimeBudget = always,
     beyond: Beyond = Beyond(),
 ) -> SearchResult:
-    """The search for effects with its verdict."""
-    result = _search_within_calibration(context, catalogue, progress, time_left, beyond)
-    if not _may_move_further(result) or not time_left():
-        return result
-    progress("searching again, with a model that may move further", 0.1)
-    wider = replace(context, tuning=context.tuning.with_wider_bound())
-    again = _search_within_calibration(wider, catalogue, progress, time_left, Beyond())
-    fewer = result.judgement.verdict != "explained" or len(again.found.steps) < len(result.found.steps)
-    better = fewer and again.judgement.verdict == "explained"
-    return replace(again, remarks=(MODEL_MOVED, *again.remarks)) if better else result
-
-
-def _may_move_further(result: SearchResult) -> bool:
-    """Whether a mismatch is left, or three effects were needed, where a model was re-tuned as far as it may."""
-    context, found = result.context, result.found
-    left = result.judgement.verdict in ("unexplained", "partly_explained") or len(found.steps) == MOST_EFFECTS
-    fixed = found.statistic is not None or context.references is not None or context.certain
-    ends = (found.retuned, *found.steps, found.after)
-    return left and not fixed and any(context.tuning.is_at_bound(end.fitted.deviations) for end in ends)
-
-
-def _search_within_calibration(
-    context: SearchContext, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget, beyond: Beyond
-) -> SearchResult:
-    """The search with the model's own parameters within `Tuning.bound`."""
+    """The search for effects with its verdict, with the model's own parameters within `Tuning.bound`."""
     beyond = Beyond(_guarded(beyond.before_pairs), _guarded(beyond.at_end))
     alone = add_effects(context, catalogue, begin(context, progress), progress, time_left, most=1)
     early = SearchResult(context, alone, Judgement("unexplained", False))
@@ -134,6 +116,27 @@ def _search_within_calibration(
         return early
     result = _search_with_pairs(context, alone, catalogue, progress, time_left, beyond.at_end)
     return _keep_early(early, result)
+
+
+def move_model_further(
+    context: SearchContext,
+    result: SearchResult,
+    catalogue: Sequence[Effect],
+    progress: Progress,
+    time_left: TimeBudget = always,
+) -> SearchResult:
+    """The search repeated with a wider bound of the model's own parameters, where the result leaves a mismatch or needs
+    three effects, and a parameter is at its bound; the same result where that explains nothing by fewer effects.
+    context: of the search that gave the result."""
+    if not catalogue or not may_move_further(result) or not time_left():
+        return result
+    progress("searching again, with a model that may move further", 0.1)
+    wider = replace(context, tuning=context.tuning.with_wider_bound())
+    again = search_effects(wider, catalogue, progress, time_left)
+    if not is_plainer(again, result):
+        return result
+    unconfirmed = (*result.unconfirmed, *again.unconfirmed)
+    return replace(again, remarks=(MODEL_MOVED, *again.remarks), unconfirmed=unconfirmed)
 
 
 def _keep_early(early: SearchResult, result: SearchResult) -> SearchResult:
@@ -172,11 +175,7 @@ def _search_with_pairs(
     left = found.after if judged.named or (found.steps and as_good_as_noise(found)) else found.retuned
     if found.ended_early or found.barred or not shows_there_alone(left.score.test, left):
         return beyond(first)
-    opened = _find_with_opened(first, left, catalogue, progress, time_left)
-    if _names_no_more(first, opened) and time_left():
-        finer = _find_with_opened(first, left, catalogue, progress, time_left, FINER_PARTS[-1])
-        opened = opened if _names_no_more(first, finer) else finer
-    adds = _adds_confirmed(first, opened)
+    opened, adds = _find_in_parts(first, left, catalogue, progress, time_left)
     if adds and (judged.named or opened.judgement.verdict == "explained"):
         there = beyond(opened)
         said = tuple(remark for remark in opened.remarks[:1] if remark not in there.remarks)
@@ -210,10 +209,11 @@ def _find_with_opened(
     progress: Progress,
     time_left: TimeBudget,
     coarsest: int = HALVES,
-) -> SearchResult:
+) -> tuple[SearchResult, int]:
     """The search repeated with a part of the held-out samples to fit and to choose by: all but the loudest stretches
     where the others show the mismatch, else the first half of each, or every other of more parts. coarsest: number of
-    parts from which on stretches are cut; beyond halves, the loudest are, too."""
+    parts from which on stretches are cut; beyond halves, the loudest are, too. Also returns the number of parts, 0 for
+    the loudest against the others."""
     milder = first.context.open_milder(left) if coarsest == HALVES else None
     context, parts = first.context.open_alternate(left, coarsest) if milder is None else (milder, 0)
     going_on = left is first.found.after and as_good_as_noise(first.found)
@@ -221,19 +221,35 @@ def _find_with_opened(
     found = explain(context, catalogue, progress, time_left, begun)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     used = {0: MILDER_TEST_USED, HALVES: TEST_HALF_USED}.get(parts, TEST_PARTS_USED)
-    return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found)))
+    return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found))), parts
 
 
-def _names_no_more(first: SearchResult, opened: SearchResult) -> bool:
-    """Whether a search with opened samples found no effect beyond the first: these may hold too little of it, such as
-    none of the few contacts with a stop."""
-    return _sites(opened.found.after) <= _sites(first.found.after)
+def _find_in_parts(
+    first: SearchResult, left: FittedCandidate, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
+) -> tuple[SearchResult, bool]:
+    """What is found with opened samples, and whether it adds to the first; in the finest parts, too, where it adds
+    nothing: coarser ones may hold too little, such as none of the few contacts with a stop."""
+    opened, parts = _find_with_opened(first, left, catalogue, progress, time_left)
+    if _adds_confirmed(first, opened, parts):
+        return opened, True
+    if parts != FINER_PARTS[-1] and _sites(opened.found.after) <= _sites(_known(first)) and time_left():
+        finer, parts = _find_with_opened(first, left, catalogue, progress, time_left, FINER_PARTS[-1])
+        if _adds_confirmed(first, finer, parts):
+            return finer, True
+    return opened, False
 
 
-def _adds_confirmed(first: SearchResult, opened: SearchResult) -> bool:
+def _known(first: SearchResult) -> FittedCandidate:
+    return first.found.after if first.judgement.named else first.found.retuned
+
+
+def _adds_confirmed(first: SearchResult, opened: SearchResult, parts: int) -> bool:
     """Whether a search with opened samples names all that the first did, and more, which what is still held out
-    confirms; or leaves little with a part of that, where the first had taken up too much."""
-    before, found = first.found.after if first.judgement.named else first.found.retuned, opened.found
+    confirms; or leaves little with a part of that, where the first had taken up too much. parts: as of
+    `_find_with_opened`; those finer than halves lie between what was fitted, so that no more than noise may be left."""
+    before, found = _known(first), opened.found
+    if parts > HALVES and np.nanmax(found.after.score.test, initial=0.0) > EXPLAINED_ERROR:
+        return False
     known, named = _sites(before), _sites(found.after)
     instead = as_good_as_noise(found) and known & named
     if not opened.judgement.named or not named - known or not (known <= named or instead):

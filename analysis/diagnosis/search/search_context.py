@@ -16,8 +16,10 @@ from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.settings import (
     HELD_OUT_ALONE_ERROR,
     LEAST_FITTED,
+    LEAST_PART,
     LOUDER,
     MOST_FITTED,
+    NOISE_ALONE,
     WORTH_FITTING,
 )
 from analysis.diagnosis.types import Mapper, Mask
@@ -78,12 +80,16 @@ class SearchContext:
     """Isolates crashes of single effects."""
     opened: bool = False
     """A part of the held-out samples is used to fit and to choose by."""
+    least_left: float = NOISE_ALONE
+    """Error of the worst channel, times the noise, from which on a further effect is looked for."""
 
     def open_alternate(self, shows: FittedCandidate, coarsest: int = HALVES) -> "tuple[SearchContext, int]":
         """Copy of the context in which a part of every held-out stretch is used to fit and to choose by, and into how
         many parts stretches were cut: the first of two, or, where one half alone shows the mismatch (as of a sweep),
         every other of more. shows: as of `open_milder`. coarsest: least number of parts that is tried."""
-        for parts in (count for count in (HALVES, *FINER_PARTS) if count >= coarsest):
+        longest = max(record.longest_held_out() for record in self.whole.records)
+        fine_enough = [parts for parts in (HALVES, *FINER_PARTS) if parts >= coarsest]
+        for parts in (parts for parts in fine_enough if longest >= parts * LEAST_PART):
             opened = [record.every_other_part(parts) for record in self.whole.records]
             if self._both_show(opened, shows):
                 return self._open(opened), parts

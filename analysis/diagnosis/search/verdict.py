@@ -16,7 +16,9 @@ from analysis.diagnosis.settings import (
     EXPLAINED_BY_CHANCE,
     HELD_OUT_ALONE_ERROR,
     HELD_OUT_ERROR,
+    HELD_OUT_SURPRISE,
     HELD_OUT_TOO_SMALL,
+    MOST_EFFECTS,
     NAMED_ERROR,
     NAMED_GAIN,
     NAMED_SHARE,
@@ -30,8 +32,9 @@ TEST_HALF_USED = (
     "such stretch was used to find it, the second half to confirm it."
 )
 TEST_PARTS_USED = (
-    "What was kept for the test shows something that the rest of the recording does not hold, each stretch in one half "
-    "alone: every other of several equal parts of each such stretch was used to find it, those between to confirm it."
+    "What was kept for the test shows something that the rest of the recording does not hold, and only in places: "
+    "every other of many equal parts of each such stretch was used to find it, those between to confirm it. They are "
+    "of the same motion, so that this test is weaker than one of another recording."
 )
 MILDER_TEST_USED = (
     "What was kept for the test shows something that the rest of the recording does not hold: all but the loudest of "
@@ -43,8 +46,9 @@ ONLY_REFINES = (
     "but what they add to it does not show, so none of them is named."
 )
 MODEL_MOVED = (
-    f"The model's own parameters were let move by up to {WIDER_RETUNING_BOUND:g} standard deviations of their "
-    "calibration, as less left a mismatch: it may have been fitted to a device that had the missing physics already."
+    f"The model's own parameters were allowed to move by up to {WIDER_RETUNING_BOUND:g} standard deviations of their "
+    "calibration: within fewer, nothing as plain explains the recordings. The model may have been fitted to a device "
+    "that had the missing physics already."
 )
 
 
@@ -132,3 +136,28 @@ def shares_taken(without: FittedCandidate, steps: Sequence[FittedCandidate]) -> 
     """Share of the mismatch of the re-tuned model that each step removed; their sum is at most 1."""
     left = [0.0, *(share_of_mismatch(without, step) for step in steps)]
     return tuple(max(after - before, 0.0) for before, after in pairwise(left))
+
+
+def may_move_further(result: SearchResult) -> bool:
+    """Whether a mismatch is left, or three effects were needed, where a model was re-tuned as far as it may."""
+    context, found = result.context, result.found
+    verdict, ends = result.judgement.verdict, (found.retuned, *found.steps, found.after)
+    left = verdict in ("unexplained", "partly_explained")
+    left = left or (verdict == "explained" and len(found.steps) == MOST_EFFECTS)
+    fixed = found.statistic is not None or context.references is not None or context.certain
+    return left and not fixed and any(context.tuning.is_at_bound(end.fitted.deviations) for end in ends)
+
+
+def is_plainer(again: SearchResult, result: SearchResult) -> bool:
+    """Whether a search with a wider bound explains, by effects or by parameters alone, what the first does not, or by
+    fewer effects; by a model that is possible, and away from the wider bound."""
+    found, tuning = again.found, again.context.tuning
+    if result.judgement.verdict == "explained" and len(found.steps) >= len(result.found.steps):
+        return False
+    explains = again.judgement.verdict == "explained"
+    alone = again.judgement.verdict == "parameters"
+    alone = alone and not np.nanmax(found.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE
+    if not explains and not alone:
+        return False
+    deviations = (found.after if explains else found.retuned).fitted.deviations
+    return tuning.is_possible(deviations) and not tuning.is_at_bound(deviations)

@@ -41,6 +41,18 @@ def test_a_device_that_varies_does_not_raise_the_floor(device):
     assert any("differ between periods" in remark for remark in floor.remarks)
 
 
+def test_losses_in_every_segment_do_not_bias_the_noise_at_rest(device):
+    recording = device(rest=3000, levels=(1.0, 2.0, 4.0)).recorded()
+    lost = np.random.default_rng(5).random(len(recording.response.samples)) < 0.01
+    lost[0] = False
+    kept = np.maximum.accumulate(np.where(lost, 0, np.arange(len(lost))))
+    lossy = replace(recording, response=replace(recording.response, samples=recording.response.samples[kept]))
+    floor = noise_floor(lossy)
+    assert all(floor.response.more_than_rest)
+    assert floor.response_rms == pytest.approx(0.05, rel=0.03)
+    assert noise_floor(recording).response_rms == pytest.approx(0.05, rel=0.03)
+
+
 def test_a_density_follows_coloured_noise(device):
     recording = device(noise=0.0).recorded()
     white = 0.05 * np.random.default_rng(3).standard_normal(recording.response.samples.shape)

@@ -2,17 +2,18 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
-from analysis.diagnosis.search.explain import Explanation, is_worth_searching, retune_alone
+from analysis.diagnosis.search.explain import Explanation, explain, is_worth_searching, retune_alone
 from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little
 from analysis.diagnosis.search.revise_selection import drop_needless, exchange_effects, exchange_for_relatives
 from analysis.diagnosis.search.search import prune
 from analysis.diagnosis.search.time_budget import CountedBudget, always
-from analysis.diagnosis.settings import SEARCH_ON
+from analysis.diagnosis.settings import EXPLAINED_ERROR
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 
@@ -21,6 +22,12 @@ LIMIT_N, LAG_HZ = 1.3, 60.0
 
 def quiet(said, share):
     pass
+
+
+def with_error(candidate, error):
+    """The candidate with the same error, times the noise, in all channels."""
+    same = np.full(len(candidate.score.fit), error)
+    return replace(candidate, score=replace(candidate.score, fit=same, choose=same))
 
 
 def claim(name, **values):
@@ -62,10 +69,10 @@ CATALOGUE = [EFFECTS[name] for name in ("amplifier_lag", "sensor_lag", "force_sa
 
 
 def test_the_first_effect_is_looked_for_again_beside_the_second(limited_and_late, compromised):
-    assert compromised.after.score.worst_channel > SEARCH_ON
+    assert compromised.after.score.worst_channel > EXPLAINED_ERROR
     found = exchange_effects(limited_and_late, compromised, CATALOGUE, quiet, always)
     assert names(found) == ["force_saturation", "sensor_lag"]
-    assert found.after.score.worst_channel < SEARCH_ON
+    assert found.after.score.worst_channel < EXPLAINED_ERROR
     assert len(found.rounds) == len(found.steps) == 2
 
 
@@ -110,11 +117,11 @@ def test_a_plain_law_is_exchanged_for_its_refinement_beside_the_second(rubbing_a
 
     monkeypatch.setattr(revised, "find_first_fits", find_and_note)
     plain = found_of(rubbing_and_late, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
-    assert plain.after.score.worst_channel > SEARCH_ON
+    assert plain.after.score.worst_channel > EXPLAINED_ERROR
     everything = list(EFFECTS.values())
     found = exchange_for_relatives(rubbing_and_late, plain, everything, quiet, always)
     assert names(found) == ["asymmetric_friction", "sensor_lag"]
-    assert found.after.score.worst_channel < SEARCH_ON
+    assert found.after.score.worst_channel < EXPLAINED_ERROR
     rubs = {"coulomb_friction", *(e.name for e in everything if "coulomb_friction" in e.simpler)}
     assert tried == [rubs]
     # Only at the place of the law that they replace.
@@ -126,7 +133,7 @@ def test_a_refinement_that_adds_little_takes_no_place(arena_of):
     context = arena_of((rubs, PlacedEffect(EFFECTS["force_saturation"], (0,), {"limit": LIMIT_N})))
     # The second effect is not the right one: what it leaves, a refinement of the first takes up in part.
     found = found_of(context, claim("coulomb_friction", level=0.08), claim("sensor_lag", bandwidth=LAG_HZ))
-    assert found.after.score.worst_channel > SEARCH_ON
+    assert found.after.score.worst_channel > EXPLAINED_ERROR
     assert exchange_for_relatives(context, found, list(EFFECTS.values()), quiet, always) is found
 
 
@@ -135,7 +142,7 @@ def test_another_law_of_the_family_takes_the_place_of_one_that_it_does_not_refin
     sticking = found_of(rubbing_and_late, at_rest, claim("sensor_lag", bandwidth=LAG_HZ))
     found = exchange_for_relatives(rubbing_and_late, sticking, list(EFFECTS.values()), quiet, always)
     assert names(found) == ["asymmetric_friction", "sensor_lag"]
-    assert found.after.score.worst_channel < SEARCH_ON
+    assert found.after.score.worst_channel < EXPLAINED_ERROR
 
 
 def test_a_law_without_refinements_stays(rubbing_and_late):
@@ -193,7 +200,7 @@ def test_three_stay_where_any_two_leave_more_than_laws_of_real_devices_do(arena_
 def test_a_third_goes_though_it_shows_where_two_leave_as_little_as_laws_of_real_devices_do(arena_of):
     context, found = three_effects(arena_of, 5e4)
     two = found.steps[1]
-    assert two.score.worst_channel > SEARCH_ON
+    assert two.score.worst_channel > EXPLAINED_ERROR
     assert is_worthwhile(two, found.steps[2])
     assert names(drop_needless(context, found, always)) == ["force_saturation", "sensor_lag"]
     # So it is not looked for, but in samples that were opened: few among many.
@@ -202,6 +209,32 @@ def test_a_third_goes_though_it_shows_where_two_leave_as_little_as_laws_of_real_
     # Nor is one of the two exchanged.
     pair = replace(found, after=context.with_test_score(two), steps=found.steps[:2], rounds=found.rounds[:2])
     assert exchange_effects(context, pair, list(EFFECTS.values()), quiet, always) is pair
+
+
+def test_a_second_effect_is_looked_for_where_more_than_noise_is_left(limited_and_late):
+    found = found_of(limited_and_late, claim("force_saturation", limit=LIMIT_N))
+    assert not is_worth_searching(limited_and_late, found, with_error(found.steps[0], 1.02))
+    assert is_worth_searching(limited_and_late, found, with_error(found.steps[0], 1.08))
+
+
+def test_of_a_small_remainder_an_effect_must_take_half(limited_and_late):
+    (step,) = found_of(limited_and_late, claim("force_saturation", limit=LIMIT_N)).steps
+    assert not is_worthwhile(with_error(step, 1.10), with_error(step, 1.07))
+    assert is_worthwhile(with_error(step, 1.10), with_error(step, 1.02))
+    # Of a large one, a smaller share is enough.
+    assert is_worthwhile(with_error(step, 3.0), with_error(step, 2.0))
+
+
+def test_no_fourth_effect_is_looked_for_beside_three_that_are_taken_over(limited_and_late):
+    found = found_of(
+        limited_and_late,
+        claim("coulomb_friction", level=0.01),
+        claim("hardening_stiffness", k3=10.0),
+        claim("sensor_lag", bandwidth=900.0),
+    )
+    again = explain(replace(limited_and_late, opened=True), [], quiet, begun=found.rounds)
+    assert again.after.score.worst_channel > EXPLAINED_ERROR
+    assert [step.newest for step in again.steps] == [step.newest for step in found.steps]
 
 
 def test_the_last_goes_where_it_only_led_the_others_out_of_a_local_minimum(limited_and_late):
@@ -221,7 +254,7 @@ def test_the_last_goes_where_it_only_led_the_others_out_of_a_local_minimum(limit
     assert is_worthwhile(stuck, helped.steps[2])
     left = drop_needless(limited_and_late, found, always)
     assert names(left) == ["force_saturation", "sensor_lag"]
-    assert left.after.score.worst_channel < SEARCH_ON
+    assert left.after.score.worst_channel < EXPLAINED_ERROR
     assert [each.newest for each in left.rounds[-1]] == ["sensor_lag"]
 
 

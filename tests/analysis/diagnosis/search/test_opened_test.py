@@ -7,8 +7,11 @@ import pytest
 from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.search import search, search_context
 from analysis.diagnosis.search.search_context import FINER_PARTS, HALVES
-from analysis.diagnosis.search.verdict import MILDER_TEST_USED
+from analysis.diagnosis.search.verdict import MILDER_TEST_USED, TEST_PARTS_USED
+from equalizer.effects.catalogue import CATALOGUE
+from study.evaluation.challenge.draw_bank import case_of, draw
 from tests.diagnosed import device
 from tests.lawful import arena_of, law, recorded
 
@@ -101,3 +104,21 @@ def test_stretches_that_show_it_in_one_half_alone_are_opened_in_finer_parts(show
         middle = loud.start + number * length + length // 2
         assert before.test[middle]
         assert record.test[middle] == (number % 2 == 1)
+
+
+STOP_AND_SENSOR = draw(102000, 86)
+"""A stop that a sweep reaches a few times, beside a nonlinear sensor that all segments show."""
+
+
+@pytest.mark.parametrize(("finer", "named"), [(FINER_PARTS[:1], set()), (FINER_PARTS, set(STOP_AND_SENSOR.effects))])
+def test_few_contacts_with_a_stop_are_found_in_fine_parts_alone(finer, named, monkeypatch):
+    monkeypatch.setattr(search_context, "FINER_PARTS", finer)
+    monkeypatch.setattr(search, "FINER_PARTS", finer)
+    case = case_of(STOP_AND_SENSOR, "device")
+    among = {*STOP_AND_SENSOR.effects, "sensor_gain", "hardening_stiffness"}
+    others = tuple(effect.name for effect in CATALOGUE if effect.name not in among)
+    settings = DiagnosisSettings(discovery=False, without=others)
+    found = diagnose([case.recording], case.model, settings, map, lambda what, share: None)
+    assert {effect.effect for effect in found.diagnosis.effects} == named
+    assert (found.diagnosis.verdict == "explained") is bool(named)
+    assert (TEST_PARTS_USED in found.remarks) is bool(named)
