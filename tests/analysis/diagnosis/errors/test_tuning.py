@@ -156,3 +156,17 @@ def test_small_deviations_move_the_response_in_a_straight_line():
         up, down = (linear_steps(tuning.tune(sign * at), 1e-3).advance - bare for sign in (1.0, -1.0))
         assert np.abs(up).max() > 0
         assert up == pytest.approx(-down, abs=1e-2 * np.abs(up).max())
+
+
+@pytest.mark.parametrize(("name", "lowest"), [("mass fx", 62.5), ("damping fx", 13.4), ("stiffness fx", 21.7)])
+def test_a_model_is_possible_until_a_matrix_becomes_indefinite(name, lowest):
+    tuning = tuning_of(hanging(1), ("fx",))
+    deviations = np.zeros(len(tuning.names))
+    deviations[tuning.names.index(name)] = -0.9 * lowest
+    assert tuning.is_possible(deviations)
+    deviations[tuning.names.index(name)] = -1.1 * lowest
+    if name == "mass fx":  # no such model can be made
+        with pytest.raises(MechanicalModelError):
+            tuning.is_possible(deviations)
+    else:
+        assert not tuning.is_possible(deviations)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.noise.noise_floor import noise_floor
+from analysis.diagnosis.noise.repeat_noise import _no_more_than_rest
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
@@ -41,13 +42,28 @@ def test_a_device_that_varies_does_not_raise_the_floor(device):
     assert any("differ between periods" in remark for remark in floor.remarks)
 
 
-def test_losses_in_every_segment_do_not_bias_the_noise_at_rest(device):
-    recording = device(rest=3000, levels=(1.0, 2.0, 4.0)).recorded()
+def with_losses(recording):
     lost = np.random.default_rng(5).random(len(recording.response.samples)) < 0.01
     lost[0] = False
     kept = np.maximum.accumulate(np.where(lost, 0, np.arange(len(lost))))
-    lossy = replace(recording, response=replace(recording.response, samples=recording.response.samples[kept]))
-    floor = noise_floor(lossy)
+    return replace(recording, response=replace(recording.response, samples=recording.response.samples[kept]))
+
+
+def test_lines_below_the_noise_at_rest_stay_there_where_segments_vary(device):
+    recording = device(rest=3000).recorded()
+    density = np.full((500, 2), 10 * 0.05**2)
+    density[:250] = 0.01 * 0.05**2
+    varied = np.array([True, False])
+    floor, above = _no_more_than_rest(recording, recording.response.samples, density, np.full(2, 1000.0), varied)
+    assert above.tolist() == [True, False]
+    assert (floor[:250] == density[:250]).all()
+    assert floor[250:, 0] == pytest.approx(0.05**2, rel=0.1)
+    assert (floor[:, 1] == density[:, 1]).all()
+
+
+def test_losses_in_every_segment_do_not_bias_the_noise_at_rest(device):
+    recording = device(rest=3000, levels=(1.0, 2.0, 4.0)).recorded()
+    floor = noise_floor(with_losses(recording))
     assert all(floor.response.more_than_rest)
     assert floor.response_rms == pytest.approx(0.05, rel=0.03)
     assert noise_floor(recording).response_rms == pytest.approx(0.05, rel=0.03)

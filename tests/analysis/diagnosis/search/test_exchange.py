@@ -10,7 +10,12 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, explain, is_worth_searching, retune_alone
 from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little
-from analysis.diagnosis.search.revise_selection import drop_needless, exchange_effects, exchange_for_relatives
+from analysis.diagnosis.search.revise_selection import (
+    drop_needless,
+    drop_unconfirmed,
+    exchange_effects,
+    exchange_for_relatives,
+)
 from analysis.diagnosis.search.search import prune
 from analysis.diagnosis.search.time_budget import CountedBudget, always
 from analysis.diagnosis.settings import EXPLAINED_ERROR
@@ -223,6 +228,18 @@ def test_of_a_small_remainder_an_effect_must_take_half(limited_and_late):
     assert is_worthwhile(with_error(step, 1.10), with_error(step, 1.02))
     # Of a large one, a smaller share is enough.
     assert is_worthwhile(with_error(step, 3.0), with_error(step, 2.0))
+
+
+def test_a_small_second_effect_goes_unless_held_out_samples_confirm_it(limited_and_late):
+    found = found_of(limited_and_late, claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ))
+    first, second = found.steps
+    small = replace(found, steps=(with_error(first, 1.10), second))
+    assert names(drop_unconfirmed(limited_and_late, small)) == ["force_saturation", "sensor_lag"]
+    worse = replace(small.after, score=replace(small.after.score, test=np.full(2, 1e3)))
+    assert names(drop_unconfirmed(limited_and_late, replace(small, after=worse))) == ["force_saturation"]
+    # One that was found in a large remainder stays: other rules judge it.
+    large = replace(found, steps=(with_error(first, 3.0), second), after=worse)
+    assert drop_unconfirmed(limited_and_late, large) is large
 
 
 def test_no_fourth_effect_is_looked_for_beside_three_that_are_taken_over(limited_and_late):

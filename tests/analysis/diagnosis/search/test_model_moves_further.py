@@ -6,6 +6,8 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.errors.hypothesis import NOTHING
+from analysis.diagnosis.search.search import move_model_further, search_effects
 from analysis.diagnosis.search.verdict import MODEL_MOVED
 from analysis.diagnosis.settings import RETUNING_BOUND, WIDER_RETUNING_BOUND
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
@@ -13,6 +15,12 @@ from equalizer.effects.effect import PlacedEffect
 from tests.diagnosed import FRICTION_N, RUBBING, device, recorded
 
 TRIED = ("coulomb_friction", "added_mass", "force_deadband")
+
+
+def quiet(said, share):
+    pass
+
+
 SETTINGS = DiagnosisSettings(without=tuple(e.name for e in CATALOGUE if e.name not in TRIED), discovery=False)
 
 
@@ -47,10 +55,31 @@ def test_what_was_moved_is_said(far):
 
 
 def test_beyond_the_wider_bound_nothing_is_explained():
-    found = diagnosed_with(off_by(3 * WIDER_RETUNING_BOUND))
+    found = diagnosed_with(off_by(1.2 * WIDER_RETUNING_BOUND))
     assert found.diagnosis.verdict != "explained"
     assert MODEL_MOVED not in found.remarks
     assert found.tuning.bound == RETUNING_BOUND
+
+
+def test_of_parameters_alone_nothing_is_named():
+    model = device(1)
+    assert model.tolerance is not None
+    off = replace(model, damping=model.damping + 9.0 * model.tolerance.damping_n_s_per_m)
+    found = diagnosed_with(off, ())
+    assert (found.diagnosis.verdict, found.diagnosis.effects) == ("parameters", ())
+    assert MODEL_MOVED in found.remarks
+
+
+def test_without_time_or_effects_to_try_the_model_does_not_move_further(arena_of):
+    context = arena_of(RUBBING, off_by(9.0))
+    first = search_effects(context, [], quiet)
+    assert first.judgement.verdict == "unexplained"
+    friction = [EFFECTS["coulomb_friction"]]
+    assert move_model_further(context, first, [], quiet) is first
+    assert move_model_further(context, first, friction, quiet, lambda: False) is first
+    beside = replace(first, context=replace(context, certain=(NOTHING,)))
+    assert move_model_further(beside.context, beside, friction, quiet) is beside
+    assert move_model_further(context, first, friction, quiet).judgement.verdict == "explained"
 
 
 def test_an_effect_that_a_model_could_take_up_is_named_first():
