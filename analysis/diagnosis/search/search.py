@@ -232,7 +232,8 @@ def _find_in_parts(
     opened, parts = _find_with_opened(first, left, catalogue, progress, time_left)
     if _adds_confirmed(first, opened, parts):
         return opened, True
-    if parts != FINER_PARTS[-1] and _sites(opened.found.after) <= _sites(_known(first)) and time_left():
+    no_more = _sites(opened.found.after) <= _sites(first.found.after)
+    if parts != FINER_PARTS[-1] and no_more and time_left():
         finer, parts = _find_with_opened(first, left, catalogue, progress, time_left, FINER_PARTS[-1])
         if _adds_confirmed(first, finer, parts):
             return finer, True
