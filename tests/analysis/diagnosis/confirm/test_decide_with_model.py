@@ -10,10 +10,12 @@ from analysis.diagnosis.confirm import decide_with_model as beside_given
 from analysis.diagnosis.confirm.balance_with_model import find_balances_beside_model
 from analysis.diagnosis.confirm.decide_with_model import objection
 from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_something
+from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search.time_budget import always
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
+from tests.diagnosed import device
 
 RATE_HZ, MASS, DAMPING, LEVEL = 200.0, 2.0, 5.0, 3.0
 GIVEN = MechanicalModel(
@@ -122,7 +124,8 @@ def test_a_name_needs_a_model_that_explains_half_of_what_is_no_noise(name, left,
 
 
 def searched(after, rival=None):
-    context = SimpleNamespace(whole=MEASURE, with_test_score=lambda each: each)
+    tuning = tuning_of(device(1), ("fx",))
+    context = SimpleNamespace(whole=MEASURE, tuning=tuning, with_test_score=lambda each: each)
     rounds = ((after, *(() if rival is None else (rival,))),)
     found = SimpleNamespace(steps=(after,), plain=candidate(NOISE), after=after, rounds=rounds)
     return SimpleNamespace(context=context, found=found)
