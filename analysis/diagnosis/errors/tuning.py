@@ -56,14 +56,10 @@ class Tuning:
         return bool(np.abs(deviations).max(initial=0.0) >= AT_RETUNING_BOUND * self.bound)
 
     def is_possible(self, deviations: FloatArray) -> bool:
-        """Whether mass, damping and stiffness with these deviations (parameters,) are no less definite than those of
-        the given model: beyond the calibration a parameter may vanish or change its sign."""
-        tuned = self.tune(deviations)
-        for part, given in zip(_matrices(tuned), _matrices(self.model), strict=True):
-            least, before = (float(eigvalsh((matrix + matrix.T) / 2)[0]) for matrix in (part, given))
-            if least < min(before, 0.0) - ROUNDING * float(np.abs(given).max()):
-                return False
-        return True
+        """Whether damping and stiffness with these deviations (parameters,) are no less definite than those of the
+        given model: beyond the calibration a parameter may vanish or change its sign. Raises as `tune`."""
+        tuned, given = self.tune(deviations), self.model
+        return _is_as_definite(tuned.damping, given.damping) and _is_as_definite(tuned.stiffness, given.stiffness)
 
     def values(self, deviations: FloatArray) -> FloatArray:
         """(parameters,): deviations, in standard deviations, as changes of the parameters, SI or relative."""
@@ -108,8 +104,10 @@ def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning
     )
 
 
-def _matrices(model: MechanicalModel) -> tuple[FloatArray, FloatArray, FloatArray]:
-    return model.mass, model.damping, model.stiffness
+def _is_as_definite(matrix: FloatArray, given: FloatArray) -> bool:
+    """Whether the smallest eigenvalue of the symmetric part is not negative, or no smaller than that of `given`."""
+    least, before = (float(eigvalsh((each + each.T) / 2)[0]) for each in (matrix, given))
+    return least >= min(before, 0.0) - ROUNDING * float(np.abs(given).max())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

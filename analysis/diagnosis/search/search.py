@@ -134,7 +134,8 @@ def move_model_further(
     wider = replace(context, tuning=context.tuning.with_wider_bound())
     again = search_effects(wider, catalogue, progress, time_left)
     if not is_plainer(again, result):
-        return result
+        ended = again.found.ended_early and OUT_OF_TIME not in result.remarks
+        return replace(result, remarks=(*result.remarks, OUT_OF_TIME)) if ended else result
     unconfirmed = (*result.unconfirmed, *again.unconfirmed)
     return replace(again, remarks=(MODEL_MOVED, *again.remarks), unconfirmed=unconfirmed)
 

@@ -8,6 +8,7 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NOTHING
 from analysis.diagnosis.search.search import move_model_further, search_effects
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME, CountedBudget
 from analysis.diagnosis.search.verdict import MODEL_MOVED
 from analysis.diagnosis.settings import RETUNING_BOUND, WIDER_RETUNING_BOUND
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
@@ -80,6 +81,10 @@ def test_without_time_or_effects_to_try_the_model_does_not_move_further(arena_of
     beside = replace(first, context=replace(context, certain=(NOTHING,)))
     assert move_model_further(beside.context, beside, friction, quiet) is beside
     assert move_model_further(context, first, friction, quiet).judgement.verdict == "explained"
+    # Where time ends on the way, the page says so.
+    begun = move_model_further(context, first, friction, quiet, CountedBudget(2))
+    assert begun.found is first.found
+    assert begun.remarks == (*first.remarks, OUT_OF_TIME)
 
 
 def test_an_effect_that_a_model_could_take_up_is_named_first():
