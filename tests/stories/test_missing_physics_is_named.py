@@ -81,6 +81,7 @@ def test_an_effect_without_strength_is_not_named(short):
     assert found_in(short(SEED, {"coulomb_friction": {"level": 1e-5}})).effects == ()
 
 
+@pytest.mark.slow
 def test_what_no_catalogue_holds_is_never_explained(short):
     found = found_in(short(SEED, {"force_hysteresis": {"half_width": 0.15}}))
     assert found.verdict in ("unexplained", "partly_explained")

@@ -67,7 +67,11 @@ def test_frequencies_far_above_the_cap_are_not_compared_and_the_report_says_so(p
     assert said in page
     by_model = analysis.declared_result.results[0]
     assert by_model.p is None and by_model.notes == (FAR_ABOVE,)
-    analysis = analyse_study(simulate_study(true_n=(guessing,) * 5), protocol)
+
+
+@pytest.mark.slow
+def test_where_all_guess_no_difference_is_told(protocol, simulate_study):
+    analysis = analyse_study(simulate_study(true_n=(float("inf"),) * 5), protocol)
     assert "The model tells no difference to 5 Hz." in analysis.compared
     assert "Both agree" not in analysis.compared and "they disagree" not in analysis.compared
 

@@ -142,6 +142,7 @@ def test_a_refinement_that_adds_little_takes_no_place(arena_of):
     assert exchange_for_relatives(context, found, list(EFFECTS.values()), quiet, always) is found
 
 
+@pytest.mark.slow
 def test_another_law_of_the_family_takes_the_place_of_one_that_it_does_not_refine(rubbing_and_late):
     at_rest = claim("stribeck_friction", coulomb=0.07, static=0.09, speed=0.01)
     sticking = found_of(rubbing_and_late, at_rest, claim("sensor_lag", bandwidth=LAG_HZ))

@@ -113,6 +113,7 @@ def humming(diagnosed):
     return explain_impacts(*searched(diagnosed, (*LOOSE, hum)), CATALOGUE)
 
 
+@pytest.mark.slow
 def test_a_hum_of_the_sensor_is_named_beside_play(humming):
     assert [each.effect.name for each in humming.after.fitted.hypothesis.claims] == ["backlash", "mains_hum"]
     played, *_, hum = humming.after.fitted.hypothesis.list_placed_effects()
@@ -124,6 +125,7 @@ def test_a_hum_of_the_sensor_is_named_beside_play(humming):
     assert judge(humming).verdict == "explained"
 
 
+@pytest.mark.slow
 def test_a_friction_that_the_search_tried_is_named_beside_play(diagnosed):
     context, found, floors = searched(diagnosed, (*LOOSE, PlacedEffect(DRY, (AXIS,), {"level": 0.3})))
     # The wrong one was likelier where waveforms were compared, and is refuted by the powers.
@@ -163,6 +165,7 @@ def test_two_bodies_that_touch_need_no_gap_and_play_does(diagnosed):
     assert asks_gap(diagnosed, GAP_M, GAP_M)
 
 
+@pytest.mark.slow
 def test_play_that_needs_no_gap_is_not_named(loose, monkeypatch):
     monkeypatch.setattr("analysis.diagnosis.search.impacts._needs_gap", lambda *asked: False)
     assert explain_impacts(*loose, CATALOGUE) is None

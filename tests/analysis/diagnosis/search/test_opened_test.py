@@ -76,6 +76,7 @@ def test_opened_samples_are_to_fit_and_the_last_third_to_choose_by(shown):
     assert (opened.choose & record.test).sum() == pytest.approx(added.sum() / 3, abs=2)
 
 
+@pytest.mark.slow
 def test_a_law_that_only_the_test_shows_is_named_and_proved_by_the_loudest(shown):
     settings = DiagnosisSettings(discovery=True, without=("hardening_stiffness", "softening_stiffness", "end_stop"))
     found = diagnose([shown], device(1), settings, map, lambda what, share: None)
@@ -110,7 +111,10 @@ STOP_AND_SENSOR = draw(102000, 86)
 """A stop that a sweep reaches a few times, beside a nonlinear sensor that all segments show."""
 
 
-@pytest.mark.parametrize(("finer", "named"), [(FINER_PARTS[:1], set()), (FINER_PARTS, set(STOP_AND_SENSOR.effects))])
+COARSE_ALONE = pytest.param(FINER_PARTS[:1], set(), marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("finer", "named"), [COARSE_ALONE, (FINER_PARTS, set(STOP_AND_SENSOR.effects))])
 def test_few_contacts_with_a_stop_are_found_in_fine_parts_alone(finer, named, monkeypatch):
     monkeypatch.setattr(search_context, "FINER_PARTS", finer)
     monkeypatch.setattr(search, "FINER_PARTS", finer)

@@ -29,6 +29,7 @@ def test_it_is_found_in_a_part_of_the_test_and_confirmed_by_the_rest(case):
     assert search.MILDER_TEST_USED in remarks
 
 
+@pytest.mark.slow
 def test_without_that_look_the_first_alone_is_named(case, monkeypatch):
     monkeypatch.setattr(search, "_adds_confirmed", lambda *of: False)
     verdict, named, _ = names(case)
