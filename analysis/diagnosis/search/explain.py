@@ -114,8 +114,8 @@ def explain(
 ) -> Explanation:
     """Re-tunes the model and adds effects one by one. time_left: asked before each piece of the search; what was found
     when it says no is kept. begun: per step of a search on fewer samples, it and its rivals; one effect is added to
-    these, up to `MOST_EFFECTS`."""
-    found = begin(context, progress, begun)
+    these, up to `MOST_EFFECTS`. Raises OutOfTimeError where the time ends before these are fitted again."""
+    found = begin(replace(context, map_=limit_map(context.map_, time_left)) if begun else context, progress, begun)
     most = min(len(found.rounds) + 1, MOST_EFFECTS) if begun else MOST_EFFECTS
     return add_effects(context, catalogue, found, progress, time_left, most)
 

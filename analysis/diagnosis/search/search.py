@@ -51,7 +51,7 @@ from analysis.diagnosis.search.search_context import (
     SearchContext,
     shows_there_alone,
 )
-from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, always
 from analysis.diagnosis.search.verdict import (
     MILDER_TEST_USED,
     MODEL_MOVED,
@@ -176,7 +176,10 @@ def _search_with_pairs(
     left = found.after if judged.named or (found.steps and as_good_as_noise(found)) else found.retuned
     if found.ended_early or found.barred or not shows_there_alone(left.score.test, left):
         return beyond(first)
-    opened, adds = _find_in_parts(first, left, catalogue, progress, time_left)
+    try:
+        opened, adds = _find_in_parts(first, left, catalogue, progress, time_left)
+    except OutOfTimeError:
+        return beyond(replace(first, found=replace(found, ended_early=True), remarks=(OUT_OF_TIME, *first.remarks)))
     if adds and (judged.named or opened.judgement.verdict == "explained"):
         there = beyond(opened)
         said = tuple(remark for remark in opened.remarks[:1] if remark not in there.remarks)
@@ -283,14 +286,11 @@ def _exchange_and_prune(
 def _remarks(found: Explanation) -> tuple[str, ...]:
     early = (OUT_OF_TIME,) if found.ended_early else ()
     barred = (ONLY_REFINES,) if found.barred else ()
-    return early + barred + (_open_sentences(found.undetermined) if found.undetermined else ())
-
-
-def _open_sentences(names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(
+    undetermined = (
         f"An explanation by {noun_of(name)} is not named: these recordings leave its parameters as good as open."
-        for name in dict.fromkeys(names)
+        for name in dict.fromkeys(found.undetermined)
     )
+    return (*early, *barred, *undetermined)
 
 
 def _judge_with_prediction(context: SearchContext, found: Explanation) -> Judgement:

@@ -6,6 +6,7 @@ import pytest
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.search import search
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
 from study.evaluation.challenge.draw_bank import case_of, draw
 
 SEED, SLOW_SENSOR_AND_HARDENING = 99100, 102
@@ -16,8 +17,8 @@ def case():
     return case_of(draw(SEED, SLOW_SENSOR_AND_HARDENING), "sledge")
 
 
-def names(case):
-    settings = DiagnosisSettings(discovery=False)
+def names(case, time_left=always):
+    settings = DiagnosisSettings(discovery=False, time_left=time_left)
     found = diagnose([case.recording], case.model, settings, map, lambda what, share: None)
     return found.diagnosis.verdict, {effect.effect for effect in found.diagnosis.effects}, found.remarks
 
@@ -27,6 +28,19 @@ def test_it_is_found_in_a_part_of_the_test_and_confirmed_by_the_rest(case):
     verdict, named, remarks = names(case)
     assert (verdict, named) == ("explained", {"sensor_lag", "hardening_stiffness"})
     assert search.MILDER_TEST_USED in remarks
+
+
+def test_where_the_time_ends_with_the_opened_part_the_first_alone_is_named_and_that_is_said(case, monkeypatch):
+    opened, find = [], search._find_with_opened
+
+    def find_late(*given):
+        opened.append(given)
+        return find(*given)
+
+    monkeypatch.setattr(search, "_find_with_opened", find_late)
+    verdict, named, remarks = names(case, lambda: not opened)
+    assert (verdict, named) == ("partly_explained", {"sensor_lag"})
+    assert len(opened) == 1 and OUT_OF_TIME in remarks
 
 
 @pytest.mark.slow
