@@ -6,7 +6,7 @@ from equalizer.effects.discovered_law import axis_names
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.tracking.compensation.known_forces import LAWS
-from equalizer.tracking.compensation.law_forces import reason_law_not_compensated
+from equalizer.tracking.compensation.law_compensation import reason_law_not_compensated
 
 IN_MODEL = "it is linear, so the identified model has it; compensating it again would count it twice"
 

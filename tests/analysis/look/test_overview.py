@@ -15,7 +15,7 @@ def test_an_intact_recording_has_no_findings(sound):
     ]
     assert [(band.command, round(band.low_hz)) for band in found.bands] == [("f1", 0)]
     assert found.coherences[0].share > 0.95
-    assert found.pairs[0].agreement.factor == pytest.approx(1.0, rel=0.01)
+    assert found.pairs[0].agreement.gain == pytest.approx(1.0, rel=0.01)
 
 
 def test_what_is_wrong_comes_first(sound):

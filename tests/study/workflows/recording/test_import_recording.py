@@ -9,7 +9,7 @@ from study.errors import StudyError, WrongUseError
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.recording.import_recording import ImportPlan, import_recording
-from study.workflows.recording.recording_from import read_any_recording
+from study.workflows.recording.read_any_recording import read_any_recording
 
 T = np.arange(200) / 1000
 TABLE = "time [s],fx [N],ax [g]\n" + "\n".join(f"{t:.3f},{np.sin(99 * t):.6f},{t * t:.9f}" for t in T) + "\n"

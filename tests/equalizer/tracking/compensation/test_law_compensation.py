@@ -9,7 +9,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
-from equalizer.tracking.compensation.law_forces import COMMANDS, FOLDED, REMEMBERS, SENSED, SEVERAL
+from equalizer.tracking.compensation.law_compensation import COMMANDS, FOLDED, REMEMBERS, SENSED, SEVERAL
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 
 RATE_HZ, BAND_HZ, N = 1000.0, (5.0, 35.0), 1000
