@@ -111,7 +111,8 @@ def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tu
     if noticed:
         sentences.append(
             f"The two directions differed in more than their direction, by what a participant with an internal "
-            f"noise of {USUAL_NOISE_DB:g} dB notices: {conjoin(noticed)}. Those directions can be told unfelt."
+            f"noise of {USUAL_NOISE_DB:g} dB notices: {conjoin(noticed)}. So those answers need not be "
+            "about the direction."
         )
     if followed:
         sentences.append(
