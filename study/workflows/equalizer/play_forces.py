@@ -12,8 +12,8 @@ from typing import Any
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.trajectory import FORCES
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
-from study.devices.admission import HAND_STIMULUS_CAP_N
 from study.devices.device import Device, DeviceSettings, Fault, Played
+from study.devices.opening import HAND_STIMULUS_CAP_N
 from study.errors import DeviceError, StudyError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
 from study.session.views.handle_notice import BeforeMoving, free_handle_notice
