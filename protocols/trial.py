@@ -75,6 +75,7 @@ class Trial:
     correct: bool | None
     reversal: bool
     response_time_s: float | None
+    """From the start of the stimulus, its fade-in included; in detection from the end of the second interval."""
     delivered_mps2: float | None
     off_axis_mps2: float | None
     displacement_mm: float | None

@@ -35,7 +35,7 @@ COST = 8.0
 MOST = 2
 """Causes at a time: with more of them, what friction does beyond its law is taken for hand and motor."""
 SAME = 2.0
-"""Ratio of squared misfits below which two causes cannot be told apart. On the simulated omega.3 a hand that becomes
+"""Ratio of squared misfits below which two causes cannot be distinguished. On the simulated omega.3 a hand that becomes
 one and a half of what it was leaves 1.2 to 1.7 times what a gain leaves: friction is more there than its law."""
 DELAY_STEPS = 3
 """Gauss-Newton steps for a delay, in which the response is not linear."""

@@ -74,7 +74,7 @@ def _diagnose_by_balance(
     """Findings with the laws that the force balances name; None where they name none, or simulations confirm none."""
     # Imported here, as below: a given model is searched by simulation.
     from analysis.diagnosis.confirm.confirm_laws import leaves_open, search_by_balance
-    from analysis.diagnosis.confirm.measures_of_balances import list_fitting_measures
+    from analysis.diagnosis.confirm.force_balance_measures import list_fitting_measures
 
     for number, fitting in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
         progress("fitting the named laws", 0.2 + 0.3 * number)
@@ -98,7 +98,7 @@ def _diagnose_by_model(
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     if settings.fitted and balances:
         # Imported here, as above: only a model that was fitted has balances.
-        from analysis.diagnosis.confirm.measures_of_balances import choose_forces_of_balance
+        from analysis.diagnosis.confirm.force_balance_measures import choose_forces_of_balance
 
         fitting = choose_forces_of_balance(recordings, fitting, balances)
     if settings.fitted and is_too_short_to_name(recordings):

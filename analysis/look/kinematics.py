@@ -6,10 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
-from analysis.look.agreement import Agreement, agreement
 from analysis.look.channels import Channel, Stretch
 from analysis.look.check import Check
 from analysis.look.cross_spectra import CrossSpectra, cross_spectra
+from analysis.look.gain_and_lag import GainAndLag, estimate_gain_and_lag
 from analysis.wording import typeset
 from equalizer.signals.signal import FloatArray
 
@@ -45,7 +45,9 @@ class KinematicPair:
     derivative: str
     """Label of the channel that it is compared with."""
     order: int
-    agreement: Agreement
+    """1: first derivative, 2: second."""
+    agreement: GainAndLag
+    """Gain and lag of `derivative` relative to the differentiated channel."""
 
 
 def find_kinematic_pairs(
@@ -66,19 +68,19 @@ def _best_pair(
         order = _ORDER[later.unit] - _ORDER[earlier.unit]
         if order > 0 and later.unit.startswith(earlier.unit.split("/")[0]) and later.role != "excitation":
             agreed = _compare_derivative(earlier, later, order, (stretches, rate_hz))
-            if agreed is not None and agreed.share >= LEAST_SHARE:
+            if agreed is not None and agreed.coherent_share >= LEAST_SHARE:
                 found.append(KinematicPair(earlier.label, later.label, order, agreed))
-    return max(found, key=lambda pair: pair.agreement.share, default=None)
+    return max(found, key=lambda pair: pair.agreement.coherent_share, default=None)
 
 
 def _compare_derivative(
     earlier: Channel, later: Channel, order: int, timing: tuple[Sequence[Stretch], float]
-) -> Agreement | None:
+) -> GainAndLag | None:
     stretches, rate_hz = timing
     differentiated = replace(earlier, samples=derivative(earlier.samples, order, rate_hz))
     inner = [(start + 1, stop - 1) for start, stop in stretches if stop - start > 4]
     spectra = cross_spectra((differentiated, later), inner, rate_hz) if inner else None
-    return agreement(spectra, 0, 1, _difference_gain(spectra, order, rate_hz)) if spectra else None
+    return estimate_gain_and_lag(spectra, 0, 1, _difference_gain(spectra, order, rate_hz)) if spectra else None
 
 
 def derivative(samples: FloatArray, order: int, rate_hz: float) -> FloatArray:
@@ -107,17 +109,17 @@ def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
     agreed = pair.agreement
     late = _lag_text(agreed.lag_samples, rate_hz)
     text = (
-        f"{pair.derivative} is {typeset(f'{agreed.factor:.4g}')} times {_WORDS[pair.order]} of {pair.place}{late} "
-        f"(lines with {agreed.share:.0%} of its power)."
+        f"{pair.derivative} is {typeset(f'{agreed.gain:.4g}')} times {_WORDS[pair.order]} of {pair.place}{late} "
+        f"(lines with {agreed.coherent_share:.0%} of its power)."
     )
-    off = abs(abs(agreed.factor) - 1)
-    if agreed.factor < 0:
-        return Check(KINEMATICS, "wrong", text, f"Turn the sign of one of them{_cause_text(agreed.factor)}.")
-    if off > FAR and agreed.factor < 1 and agreed.lag_samples > LATE and not _cause_text(agreed.factor):
+    off = abs(abs(agreed.gain) - 1)
+    if agreed.gain < 0:
+        return Check(KINEMATICS, "wrong", text, f"Turn the sign of one of them{_cause_text(agreed.gain)}.")
+    if off > FAR and agreed.gain < 1 and agreed.lag_samples > LATE and not _cause_text(agreed.gain):
         # A wrong unit or factor delays nothing; what is weaker and later went through a filter or a flexible part.
         return Check(KINEMATICS, "notice", text, _FILTERED)
     if off > FAR:
-        return Check(KINEMATICS, "wrong", text, f"Check the units and factors of both{_cause_text(agreed.factor)}.")
+        return Check(KINEMATICS, "wrong", text, f"Check the units and factors of both{_cause_text(agreed.gain)}.")
     if off > CLOSE:
         return Check(KINEMATICS, "notice", text, "Check the calibration of both, and filters between them.")
     if abs(agreed.lag_samples) > LATE:
@@ -143,7 +145,7 @@ def _cause_text(factor: float) -> str:
 def lag_checks(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> tuple[Check, ...]:
     """Lags of channels that measure the same quantity: a command and its measurement, two sensors of a motion."""
     found = tuple(_lag_pairs(channels, spectra, rate_hz))
-    return found or (Check(LAGS, "fine", "No two channels show the same thing, so no lag between them can be told."),)
+    return found or (Check(LAGS, "fine", "No two channels measure the same quantity, so no lag can be measured."),)
 
 
 def _lag_pairs(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> Iterator[Check]:
@@ -151,10 +153,10 @@ def _lag_pairs(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: floa
         first, second = channels[each], channels[other]
         if first.unit != second.unit or {first.role, second.role} == {"command", "excitation"}:
             continue
-        agreed = agreement(spectra, each, other)
-        if agreed is None or agreed.share < SAME_SHARE or agreed.spread > SAME_SPREAD:
+        agreed = estimate_gain_and_lag(spectra, each, other)
+        if agreed is None or agreed.coherent_share < SAME_SHARE or agreed.gain_spread > SAME_SPREAD:
             continue
         late = _lag_text(agreed.lag_samples, rate_hz)
-        text = f"{second.label} is {typeset(f'{agreed.factor:.4g}')} times {first.label}{late or ', at the same time'}."
+        text = f"{second.label} is {typeset(f'{agreed.gain:.4g}')} times {first.label}{late or ', at the same time'}."
         do = "Shift the later one, or model what delays it." if late else ""
         yield Check(LAGS, "notice" if late else "fine", text, do)

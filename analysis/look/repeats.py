@@ -92,7 +92,7 @@ def repeat_checks(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
             )
         )
     if not repeats.noise:
-        none = "Nothing repeats, so noise cannot be told from what a model lacks."
+        none = "Nothing repeats, so noise cannot be distinguished from what a model lacks."
         wrong += [] if wrong else [Check(REPEATS, "notice", none, "Record some periods more than once.")]
         return tuple(wrong)
     return (*wrong, *_noise_checks(recording, repeats.noise))

@@ -5,7 +5,7 @@ Two definitions of the same picture, from a sinusoid of constant amplitude along
 * second moments, as published: the mean of the squared accelerations in the frame of the test direction. Noise,
   hum and harmonics all count as motion, so a noisy sensor rounds the ellipsoid.
 * phasors: the ellipse that the acceleration traces at the driven frequency alone, by lock-in. Noise averages out,
-  harmonics are told apart, and a phase between the axes shows as a width of the ellipse.
+  harmonics are distinguished, and a phase between the axes shows as a width of the ellipse.
 
 Frame: first axis = test direction; third = the device axis most nearly perpendicular to it, made perpendicular;
 second = third x first. For a direction in a plane of device axes the first two axes span that plane.

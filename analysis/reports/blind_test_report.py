@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from analysis.evaluation.blind_test.confidence_intervals import Figure
 from analysis.evaluation.blind_test.controlled import ControlOutcome
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.evaluation.blind_test.score import Score
-from analysis.evaluation.blind_test.share import Figure
 from analysis.evaluation.blind_test.wording import answer_text, describe_concealed, figure_text, strength_text
 from analysis.figures.picture import Picture
 from analysis.reports.page import Page, Section, Table, render_page

@@ -40,7 +40,7 @@ def rival_table(effect: NamedEffect) -> Table:
         (
             capitalise(noun_of(rival.effect)),
             probability_text(rival.probability),
-            "cannot be told apart" if rival.inseparable else "passed over",
+            "cannot be distinguished" if rival.inseparable else "passed over",
             end_sentence(rival.why_not),
         )
         for rival in sorted(effect.rivals, key=lambda rival: (not rival.inseparable, -rival.probability))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from analysis.evaluation.blind_test.confidence_intervals import Figure
 from analysis.evaluation.blind_test.injected import (
     DETECTABLE,
     JUDGED,
@@ -10,7 +11,6 @@ from analysis.evaluation.blind_test.injected import (
     injected_figures,
     tallies,
 )
-from analysis.evaluation.blind_test.share import Figure
 from analysis.reports.page import Section, Table
 
 

@@ -22,7 +22,7 @@ def detection_table(analysis: StudyAnalysis) -> Table:
     ]
     return Table(
         caption="Thresholds of detection (N)",
-        header=("Participant", "Frequency", "Felt from", "Direction told from", "Direction above detection (dB)"),
+        header=("Participant", "Frequency", "Felt from", "Direction felt from", "Direction above detection (dB)"),
         rows=tuple(rows),
         notes=(
             f"{threshold_words(analysis.protocol.staircase).cut_note} –: no completed run. The last column is given "

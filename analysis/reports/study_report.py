@@ -7,7 +7,7 @@ from analysis.figures.picture import Picture
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.population import Population
 from analysis.psychophysics.study_analysis import StudyAnalysis
-from analysis.reports.cue_tables import cue_section
+from analysis.reports.cue_section import cue_section
 from analysis.reports.declared_section import make_declared_section
 from analysis.reports.methods_text import methods_text
 from analysis.reports.page import Page, Section, render_page

@@ -3,7 +3,7 @@
 import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
-from equalizer.effects.starts.attached_oscillator import estimate_missing_mass, likely_oscillators, with_oscillator
+from equalizer.effects.starts.attached_oscillator import likely_oscillators, missing_force_spectra, with_oscillator
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -18,7 +18,7 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    missing = estimate_missing_mass(evidence, axis)
+    missing = missing_force_spectra(evidence, axis)
     natural = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
     starts = []
     for each in likely_oscillators(missing, axis, natural, RATIOS)[:2]:

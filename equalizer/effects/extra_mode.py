@@ -5,8 +5,8 @@ import numpy as np
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.attached_oscillator import (
     AttachedOscillator,
-    estimate_missing_mass,
     likely_oscillators,
+    missing_force_spectra,
     subtract_oscillator,
     with_oscillator,
 )
@@ -34,7 +34,7 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    missing, starts = estimate_missing_mass(evidence, axis), []
+    missing, starts = missing_force_spectra(evidence, axis), []
     natural = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
     for _ in range(STARTS):
         coarse = likely_oscillators(missing, axis, natural, RATIOS)[:1]

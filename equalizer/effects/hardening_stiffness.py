@@ -1,4 +1,8 @@
-"""Cubic (Duffing) stiffness: a spring that stiffens with deflection in either direction."""
+"""Cubic (Duffing) stiffness: a spring whose stiffness changes with the square of the deflection, in both directions
+alike.
+
+    F = -k3 x³        k3 > 0: hardening, k3 < 0: softening; N/m³ (a rotation: N m/rad³)
+"""
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
@@ -10,18 +14,25 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean of the force at the step's start and end; the position at the end depends on the force (implicit step)."""
-    half, start = 0.5 * parameters[0], at[X] ** 3
-    force = -half * (start + at[X_FREE] ** 3)
+    """Force (N) over one step: the mean of those at its start and end (trapezoidal rule).
+
+    The end position depends on this force (implicit step), x_end = x_free + x_per_n F, so that
+    g(F) = F + k3/2 (x³ + x_end³) = 0 is solved by Newton's method, dg/dF = 1 + 3 k3/2 x_per_n x_end². Started at the
+    force without feedback, four iterations are enough, because one step moves the axis little.
+    """
+    half, start_cubed = 0.5 * parameters[0], at[X] ** 3
+    force = -half * (start_cubed + at[X_FREE] ** 3)
     for _ in range(4):
         end = at[X_FREE] + at[X_PER_N] * force
-        off = force + half * (start + end**3)
-        force -= off / (1 + 3 * half * at[X_PER_N] * end * end)
+        residual = force + half * (start_cubed + end**3)
+        force -= residual / (1 + 3 * half * at[X_PER_N] * end * end)
     at[F_END] = -parameters[0] * (at[X_FREE] + at[X_PER_N] * force) ** 3
     return float(force)
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """k3 by linear regression of the missing force on -x³ and the linear terms of the motion; empty where it is not
+    positive, so that a search by simulation begins with hardening only."""
     motion = axis_motion(evidence, axis)
     k3 = float(regress_beside_linear(motion).fit(-(motion.position**3)).strengths[0])
     return ({"k3": k3},) if k3 > 0 else ()
@@ -29,10 +40,10 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 EFFECT = Effect(
     name="hardening_stiffness",
-    equation="F = -k3 x^3, below zero softening",
+    equation="F = -k3 x^3; softening for k3 < 0",
     source="Duffing 1918, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz",
-    signature="the missing force is an odd curve over the position; its odd harmonics rise with the level and the "
-    "lowest resonance moves up",
+    signature="the missing force is an odd function of the position; its odd harmonics grow with the level, and the "
+    "lowest resonance moves up with it",
     parameters=(Parameter("k3", -1e15, 1e15, none=0.0, scale="signed"),),
     acts=AxisForce(_law, pack_values("k3")),
     starts=_starts,

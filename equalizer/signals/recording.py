@@ -1,7 +1,7 @@
-"""A recording: what entered the plant, what came out, and under which conditions.
+"""A recording: the commands that entered the plant, the responses that were measured, and under which conditions.
 
-Sampling: `response[k]` and `position[k]` are taken at t_k just before `command[k]` is written, which is held
-until t_(k+1). A plant with direct feedthrough therefore answers `command[k-1]`.
+Time convention: `response[k]` and `position[k]` are taken at t_k just before `command[k]` is written, which is held
+until t_(k+1). A plant with direct feedthrough therefore answers `command[k-1]` in `response[k]`.
 """
 
 from collections.abc import Mapping
@@ -14,49 +14,63 @@ from equalizer.signals.summary import Summarised, Summary
 
 
 class Hold(Enum):
-    """How the command moves between its samples: held, or linearly interpolated."""
+    """Course of the command between its samples, which a discrete model has to assume."""
 
     ZERO_ORDER = "zero-order"
+    """Held until the next sample, as a digital controller writes it."""
     BAND_LIMITED = "band-limited"
+    """A continuous signal without power above half the sample rate, as one that was measured behind an anti-aliasing
+    filter."""
     LINEAR = "linear"
+    """Straight lines between the samples."""
 
 
 SEGMENT_KINDS = (
     "multisine", "sweep", "sine", "slow", "noise", "binary", "step", "impact", "free", "rest",
 )  # fmt: skip
+"""Kinds of excitation of a segment: periodic multisine, swept sine, single sine, slow movement, random noise, random
+binary signal, steps, impacts, free motion after a release, rest without a command."""
 SEGMENT_ROLES = ("fit", "test", "")
+"""Use of a segment: to fit a model, to test it on data that it has not seen, or as the identification decides."""
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Samples start (included) to stop (excluded) of one kind of excitation. Outside all segments is rest."""
+    """Samples with one kind of excitation. Outside all segments the device rests."""
 
     start: int
+    """First sample."""
     stop: int
+    """Sample after the last."""
     kind: str
+    """One of `SEGMENT_KINDS`."""
     amplitude: float = 0.0
     """Peak of the excitation in the command's unit."""
     period: int = 0
     """Samples per period; 0 = not periodic."""
     role: str = ""
+    """One of `SEGMENT_ROLES`."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class Recording(Summarised):
-    """One recording of a device. All signals share rate and length."""
+    """One recording of a device: n samples. All signals share rate and length; each states its own units."""
 
     device: str
+    """Name of the device; may be empty."""
     command: Signal
-    """(n, m): what entered the plant, virtual spring included."""
+    """(n, m): the total command that entered the plant, that of a virtual spring or controller included."""
     response: Signal
-    """(n, p)"""
+    """(n, p): measured response, such as an acceleration."""
     position: Signal | None = None
-    """(n, d)"""
+    """(n, d): measured position; None where it was not recorded."""
     excitation: Signal | None = None
-    """(n, m): the part of the command that was decided beforehand, where a feedback adds to it."""
+    """(n, m): the part of the command that was planned beforehand, where feedback (a virtual spring, a controller) adds
+    to it; None where the command is all planned, or the part is not known."""
     time_s: FloatArray | None = None
-    """(n,): time stamps where the device kept them."""
+    """(n,): time stamps (s); None where only the sample rate is known."""
     hold: Hold = Hold.ZERO_ORDER
+    """Course of the command between samples."""
     segments: tuple[Segment, ...] = ()
     meta: Mapping[str, Any] = field(default_factory=dict)
     """JSON values: place, sensor and its frame, feedback, grip, operator, provenance."""
@@ -65,7 +79,7 @@ class Recording(Summarised):
 
     @property
     def is_timed(self) -> bool:
-        """Whether time is known; where not, samples are numbered and the rate of 1 Hz is nominal."""
+        """Whether time is known. If not, samples are only numbered, and the sample rate of 1 Hz is a placeholder."""
         return self.meta.get("time") != "unknown"
 
     @property

@@ -1,6 +1,9 @@
-"""System of units of a mechanical model: of its commands (force), its motion (length) and time.
+"""Units of a mechanical model: those of force, length and time, from which all others follow.
 
-Where a command is a current or has no unit, a mass is no kg: force constants are not known, and are in every number.
+In M a + B v + K x = force, the unit of mass is force time² / length, that of damping force time / length, and that of
+stiffness force / length. In SI: N s^2/m = kg, N s/m, N/m; for a rotation N m s^2/rad and so on. Where a command is a
+current (A) or a plain number, the force constant of the motor is unknown and part of every parameter: a "mass" then has
+the unit A s^2/m, not kg.
 """
 
 import re
@@ -10,6 +13,7 @@ from dataclasses import dataclass
 _FACTOR = re.compile(r"(kg|N|m|s)(?:\^(\d+))?$")
 _RATES = ("/s^2", "/s")
 FORCES = ("N", "N m")
+"""Units of a command that is a force or a torque."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,13 +24,13 @@ class UnitSystem:
     force: str = "N"
     """Unit of a command; ASCII."""
     length: str = "m"
-    """Unit of a motion's position; ASCII, "1" for a plain number."""
+    """Unit of the position of a motion; ASCII, "1" for a plain number."""
     time: str = "s"
-    """"sample" where no time is known."""
+    """Unit of time; "sample" where no time is known."""
 
     def express(self, unit: str) -> str:
-        """The unit of the same quantity in this system. unit: SI of a translational model; a unit of neither force nor
-        motion is returned as it is."""
+        """The unit of the same quantity in this system. unit: SI unit in a translational model, such as "N s/m" or
+        "kg"; a unit that is not made of force, length and time is returned unchanged."""
         if unit == "Hz":
             return unit if self.time == "s" else f"1/{self.time}"
         over, _, under = unit.partition("/")
@@ -42,6 +46,7 @@ class UnitSystem:
         return self._format_unit(powers["N"], powers["m"], powers["s"])
 
     def _format_unit(self, force: int, length: int, seconds: int) -> str:
+        """The product of force, length and time to these powers, such as "A s^2/m"."""
         named = [(self.force, force), (self.length, length), (self.time, seconds)]
         known = [(f"({name})" if "/" in name else name, power) for name, power in named if name != "1"]
         over = [
@@ -55,7 +60,7 @@ class UnitSystem:
 
     @property
     def known(self) -> bool:
-        """Whether its forces are forces: else every number holds a constant that is not known."""
+        """Whether commands are forces or torques; if not, every parameter contains an unknown force constant."""
         return self.force in FORCES
 
     @property
@@ -68,12 +73,14 @@ LINEAR, ROTATIONAL = UnitSystem(), UnitSystem("N m", "rad")
 
 
 def system_of(commands: Sequence[str], motions: Sequence[str], time: str = "s") -> UnitSystem:
-    """Units of a recording's commands and responses, those of the first where they differ."""
+    """The unit system of a recording. commands, motions: units of its commands and of its responses (position, velocity
+    or acceleration); where they differ among themselves, those of the first channel count."""
     motion = next((motions[0].removesuffix(rate) for rate in _RATES if motions[0].endswith(rate)), motions[0])
     return UnitSystem(commands[0], motion, time)
 
 
 def _base_powers(name: str) -> tuple[tuple[str, int], ...]:
+    """A unit as powers of N, m and s: kg = N s^2/m."""
     return (("N", 1), ("s", 2), ("m", -1)) if name == "kg" else ((name, 1),)
 
 

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 
 Dimension = tuple[int, ...]
-"""Exponents of kg, m, s, A, K, rad. The angle counts, or N m and N m/rad could not be told apart."""
+"""Exponents of kg, m, s, A, K, rad. The angle counts, or N m and N m/rad could not be distinguished."""
 
 
 class UnknownUnitError(ValueError):

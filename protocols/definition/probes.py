@@ -35,7 +35,7 @@ class ProbeSettings:
         Field(
             max_length=6,
             description="Peaks of the force of the probes with a hand on the handle, in newtons, in turn: friction is "
-            "told from damping by how the answer depends on the level. Three levels, such as [0.2, 0.4, 0.8]. "
+            "distinguished from damping by how the answer depends on the level. Three levels, such as [0.2, 0.4, 0.8]. "
             "Default: none, and nothing is played between trials.",
         ),
     ] = ()

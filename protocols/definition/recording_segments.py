@@ -89,7 +89,7 @@ class MultisineSegment:
         Literal["x", "y", "z", "direction_1", "direction_2", "all"],
         Field(
             description="A device axis, a test direction, or 'all' three axes at once, each with phases of its own; "
-            "three realisations along all axes are orthogonal, so that axes can be told apart at every line."
+            "three realisations along all axes are orthogonal, so that axes can be distinguished at every line."
         ),
     ]
     duration_s: Annotated[float, Field(gt=0, le=600, description="One period: lines lie 1 / duration_s apart.")]

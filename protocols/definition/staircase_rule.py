@@ -1,4 +1,10 @@
-"""The numbers and choices of a staircase, as a protocol file states them."""
+"""The [staircase] table of a protocol: numbers and choices of a transformed up-down rule, or of the Psi method.
+
+A transformed up-down rule (Levitt, Journal of the Acoustical Society of America 49 (1971), 467) raises the level after
+a number of wrong answers in a row and lowers it after a number of right ones; its levels settle where both are equally
+likely (1 up, 3 down: 79.4 % right). The rule itself is `protocols.procedure.staircase`. Each description below is the
+text of docs/formats.md and of the schema.
+"""
 
 from enum import Enum
 from typing import Annotated, Literal, Self
@@ -9,33 +15,35 @@ from pydantic.dataclasses import dataclass
 from protocols.definition.problem import Problem, refuse
 
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+"""Unknown keys, infinities and NaN are refused."""
 
 
 class StepChange(Enum):
-    """When the next step size of the schedule comes into force.
+    """When the next step size takes effect.
 
-    Published "4 dB, then 1 dB" staircases differ here, and the threshold with them (0.7 to 1.1 dB).
+    Published staircases of "4 dB, then 1 dB" differ here, and their thresholds with them by 0.7 to 1.1 dB.
     """
 
     AFTER_REVERSAL = "after_reversal"
-    """The completing reversal still uses the old step; every later movement uses the new one."""
+    """The movement at the reversal that completes a phase has the old step, every later movement the new one."""
     AT_REVERSAL = "at_reversal"
-    """The completing reversal itself already uses the new step."""
+    """The movement at the reversal that completes a phase already has the new step."""
     AT_NEXT_REVERSAL = "at_next_reversal"
-    """The old step stays until one reversal more has happened."""
+    """Movements have the old step until one more reversal has happened."""
 
 
 @dataclass(frozen=True, config=STRICT)
 class StepPhase:
-    """A step size, and the number of reversals for which it holds."""
+    """A step size and the number of reversals for which it is used."""
 
     step_db: Annotated[float, Field(gt=0, le=20, description="Size of one movement, in dB.")]
-    reversals: Annotated[int, Field(ge=1, le=100, description="How many reversals belong to this phase.")]
+    reversals: Annotated[int, Field(ge=1, le=100, description="Number of reversals of this phase.")]
 
 
 @dataclass(frozen=True, config=STRICT)
 class BayesianPlacement:
-    """Levels by the Psi method in place of the up-down rule, which `protocols.procedure.psi` describes."""
+    """Levels by the Psi method (Kontsevich and Tyler, Vision Research 39 (1999), 2729) in place of the up-down rule;
+    the method is in `protocols.procedure.psi`."""
 
     trials: Annotated[
         int,
@@ -59,19 +67,23 @@ class BayesianPlacement:
 
 @dataclass(frozen=True, config=STRICT)
 class StaircaseRule:
-    """A transformed up-down rule. All numbers without a default are the experimenter's to state."""
+    """A transformed up-down rule. Numbers without a default must be stated by the experimenter."""
 
     start_n: Annotated[float, Field(ge=0.001, le=3.0, description="Level of the first trial of every run, in newtons.")]
     cap_n: Annotated[
         float,
-        Field(
-            gt=0, le=3.0, description="No level is above this, in newtons; 3 N at the most. Only roving goes beyond it."
-        ),
+        Field(gt=0, le=3.0, description="Highest level, in newtons; 3 N at the most. Only roving exceeds it."),
     ]
-    up_after_wrong: Annotated[int, Field(ge=1, le=10, description="Wrong answers in a row that raise the level.")]
-    down_after_right: Annotated[int, Field(ge=1, le=10, description="Right answers in a row that lower the level.")]
+    up_after_wrong: Annotated[
+        int, Field(ge=1, le=10, description="Number of wrong answers in a row that raise the level.")
+    ]
+    down_after_right: Annotated[
+        int, Field(ge=1, le=10, description="Number of right answers in a row that lower the level.")
+    ]
     steps: Annotated[tuple[StepPhase, ...], Field(min_length=1, description="Step sizes, phase by phase.")]
-    reversals: Annotated[int, Field(ge=2, le=100, description="The run ends at once with this reversal.")]
+    reversals: Annotated[
+        int, Field(ge=2, le=100, description="Number of reversals of a run, which ends with the last of them.")
+    ]
     averaged_reversals: Annotated[
         int, Field(ge=1, le=100, description="The threshold is the mean of this many last peaks and valleys.")
     ]
@@ -99,9 +111,9 @@ class StaircaseRule:
     at_cap: Annotated[
         Literal["clamp"],
         Field(
-            description="What happens at the cap. Default, and the only one offered: a movement beyond the cap stops "
-            "at the cap and goes on from there; a push against it is no reversal, because no peak is made. Both are "
-            "counted."
+            description="What happens at the cap. Default, and the only one offered: a movement beyond the cap ends at "
+            "the cap, and the next one starts there. An upward movement at the cap changes nothing and is no reversal, "
+            "because the level does not change its direction. Both are counted."
         ),
     ] = "clamp"
     mean: Annotated[
@@ -124,8 +136,9 @@ class StaircaseRule:
     bayesian: Annotated[
         BayesianPlacement,
         Field(
-            description="Levels that tell most, in place of the up-down rule (Kontsevich and Tyler 1999). Steps and "
-            "reversals above are then not used, and the threshold is the posterior mean. Default: off, as published."
+            description="Psi method in place of the up-down rule: each level is the one whose answer is expected to "
+            "leave the least entropy of threshold and slope (Kontsevich and Tyler 1999). Steps and reversals "
+            "above are then not used, and the threshold is the posterior mean. Default: off, as published."
         ),
     ] = BayesianPlacement()
 
@@ -161,7 +174,7 @@ class StaircaseRule:
 
 
 def _placement_problems(rule: StaircaseRule) -> list[Problem]:
-    """Contradictions between the keys of the up-down rule and those of Psi."""
+    """Contradictions between the keys of the up-down rule and those of the Psi method."""
     bayesian, problems = rule.bayesian, []
     if bayesian.spread_db and not rule.is_bayesian:
         wrong = f"is {bayesian.spread_db} dB, but bayesian.trials is 0"

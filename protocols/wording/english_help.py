@@ -1,4 +1,8 @@
-"""English help pages of the participant's screens, in Markdown."""
+"""English help pages of the participant's screens (F1), in Markdown, by key.
+
+A key is `help_` and the name of the screen; `help_everywhere` follows every page. Translations replace them key by key
+(`protocols.wording.english`; German and Spanish: de.toml, es.toml).
+"""
 
 HELP: dict[str, str] = {
     "help_title": "Help",
@@ -13,11 +17,11 @@ HELP: dict[str, str] = {
     "help_trial": """\
 # A trial
 
-- Feel the handle as long as you like, then press 1 or 2 for the direction along which it shakes. Where two intervals
-  are asked about, press the number of the one in which it shook.
-- If you cannot tell, guess. Many trials are meant to be hard, and no answer can do harm.
+- Feel the handle as long as you like, then press 1 or 2 for the direction along which it shakes. If the question is
+  about two intervals, press the number of the interval in which it shook.
+- If you are not sure, guess. Many trials are meant to be hard, and no answer can do harm.
 - **p** pauses: the handle stops at once, and this trial comes again afterwards.
-- **r** plays this trial again, for instance when you were disturbed. It works a few times in each run.
+- **r** plays this trial again, for instance when you were disturbed. This works a few times only.
 - **q** pauses too, and offers to leave. What you have answered is kept.
 - **Ctrl+C** takes the force off at once and leaves.
 """,
@@ -26,24 +30,24 @@ HELP: dict[str, str] = {
 
 - Let go of the handle and relax your hand. Nothing is played.
 - The rest is part of the study: a tired hand feels less. It cannot be shortened.
-- When it is over, take as long as you like, and press **Enter** to go on.
+- When it is over, take as long as you like, and press **Enter** to continue.
 - **Ctrl+C** leaves; the session can be resumed.
 """,
     "help_pause": """\
 # Pause
 
 - Nothing is played, and the handle is free. Take as long as you like.
-- **Up** and **Down** choose how to go on, **Enter** does it.
+- **Up** and **Down** move through the choices, **Enter** takes the highlighted one.
 - **n** writes a note into the log; **e** reports that something happened to the participant.
 - Leaving keeps every answer: the session can be resumed at this trial.
-- Taking the consent back erases everything, and asks once more before it does.
+- Withdrawing the consent erases all data of this participant; the program asks once more before it does.
 """,
     "help_practice": """\
 # End of a practice
 
 - The practice shows what each vibration feels like. Its answers enter no result.
-- Some vibrations are hard to tell for everyone. The study goes on all the same.
-- **Enter** goes on.
+- Some vibrations are hard to feel for everyone. The study continues in any case.
+- **Enter** continues.
 """,
     "help_demo": """\
 # Demonstration
@@ -64,14 +68,14 @@ HELP: dict[str, str] = {
     "help_playing": """\
 # Only feel
 
-- What you feel now is the one that is framed. It ends by itself.
+- You now feel the interval or direction that is framed on the screen. It ends by itself.
 - No answer is needed yet: it is asked for afterwards.
 - **p** pauses at once; **q** pauses and offers to leave.
 """,
     "help_void": """\
 # A trial that did not count
 
-- The last trial was cut short and does not count. It comes again, so nothing is lost.
+- The last trial was interrupted and does not count. It is repeated, so nothing is lost.
 - Nothing is played until you press **Enter**.
 - **Ctrl+C** leaves; the session can be resumed.
 """,
@@ -83,9 +87,9 @@ HELP: dict[str, str] = {
 - **Enter** closes this page.
 """,
     "help_withdraw": """\
-# Taking the consent back
+# Withdrawing the consent
 
-- A participant may take the consent back at any time, without giving a reason.
+- A participant may withdraw the consent at any time, without giving a reason.
 - Everything recorded of this participant is then erased, and cannot be brought back.
 - Type the word and press **Enter** to erase. **Esc** keeps everything.
 """,
@@ -95,23 +99,23 @@ HELP: dict[str, str] = {
 - **Up**, **Down** and **Tab** go from question to question.
 - A choice is made by its number, by its first letter, or with **Left**, **Right** and **Space**.
 - **Enter** chooses what is highlighted and goes to the next question.
-- **Continue** stands below the last question. It says what is missing.
+- **Continue** is below the last question. It says which answers are missing.
 - You may ask the experimenter about anything that is unclear. **Ctrl+C** leaves.
 """,
     "help_note": """\
 # A note
 
 - Write what should be known about this session later. No names: the log is kept with the data.
-- **Tab** goes on to who writes it, and whether something happened to the participant.
+- **Tab** moves on to who writes it, and whether something happened to the participant.
 - **Ctrl+S** or the button writes it into the log; **Esc** leaves without writing.
 - If a person was hurt, leave the handle alone and look after the participant first.
 """,
     "help_check": """\
 # Device check
 
-- Each line is one finding: **ok**, **warn** or **LOOK**, with what to do about it.
-- **c** checks again, after something was plugged in or mended.
-- **Enter** goes on where all is well; **g** goes on although something needs a look.
+- Each line is one finding: **ok**, **warn** or **LOOK** (needs attention), with what to do about it.
+- **c** checks again, after something was plugged in or repaired.
+- **Enter** continues if every finding is ok; **g** continues although a finding needs attention.
 - The findings are kept with the data.
 """,
     "help_preparing": """\
@@ -128,7 +132,7 @@ takes longer, because the simulated device is compiled.
 ## On every screen
 
 **F1** help, **Ctrl+P** all commands, **F9** light, dark or high contrast. **Ctrl+C** takes the force off at once and
-ends the sitting; nothing that was answered is lost. **Ctrl+Z** suspends: the hand is free until you are back.
+ends the sitting; nothing that was answered is lost. **Ctrl+Z** suspends the program: no force until you come back.
 During a session **F2** shows the experimenter's view (for the experimenter only: it asks for the session's name),
 **F4** takes a note.
 """,

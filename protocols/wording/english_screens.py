@@ -129,7 +129,7 @@ SCREENS: dict[str, str] = {
     "practice_title": "End of this practice",
     "practice_right": "{right} of the last {asked} answers were right.",
     "practice_enough": "That is enough to go on.",
-    "practice_hard": "Some vibrations are hard to tell for everyone. The study goes on all the same.",
+    "practice_hard": "Some vibrations are hard to feel for everyone. The study continues in any case.",
     "enter_goes_on": "Press Enter to go on.",
     "rest_title": "Rest",
     "rest_relax": "Let go of the handle and relax your hand.",
@@ -140,7 +140,7 @@ SCREENS: dict[str, str] = {
     "pause_reason": "Reason: {reason}.",
     "pause_go_on": "Go on with the study",
     "pause_leave": "Leave; the session can be resumed another day",
-    "pause_withdraw": "Take the consent back; everything is erased",
+    "pause_withdraw": "Withdraw the consent; everything is erased",
     "nothing_erased": "Nothing is erased.",
     "nothing_written": "Nothing was written.",
     "goes_into_log": "It goes into the log.",
@@ -170,9 +170,9 @@ SCREENS: dict[str, str] = {
     "excluded": "Thank you for coming. With one of your answers you cannot take part in this study.",
     "excluded_kept": "Nothing was played, and only this is kept. Which answer it was is not kept. The experimenter can "
     "tell you more.",
-    # Taking the consent back; a note.
+    # Withdrawing the consent; a note.
     "withdraw_word": "withdraw",
-    "withdraw_title": "Take the consent back",
+    "withdraw_title": "Withdraw the consent",
     "withdraw_all": "Everything recorded of this participant will be erased, and cannot be brought back.",
     "withdraw_how": "To erase it, type {word} and press Enter. Esc keeps everything.",
     "withdraw_other": "That is not the word {word}. Nothing is erased.",
@@ -227,10 +227,10 @@ SCREENS: dict[str, str] = {
     "line_demo_last": "This is the last vibration.",
     "line_rest": "Rest. Let go of the handle for at least {seconds} s.",
     "line_pause": "Pause ({reason}). Nothing is played.",
-    "line_pause_keys": "Enter goes on, q leaves and another day goes on, w takes the consent back and erases the "
+    "line_pause_keys": "Enter continues, q leaves and continues another day, w withdraws the consent and erases the "
     "session.",
     "line_pause_notes": "n writes a note, e reports that something happened to the participant.",
-    "line_pause_prompt": "Enter goes on: ",
+    "line_pause_prompt": "Enter continues: ",
     "line_pause_no_key": "{typed} is none of the keys; ? tells them.",
     "line_withdraw": "Type {word} to confirm; Enter alone keeps everything: ",
     "line_note": "Note: ",

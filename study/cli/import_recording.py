@@ -1,4 +1,4 @@
-"""`hapteq import`: a laboratory's files as a recording of ours."""
+"""`hapteq import`: a laboratory's files as a hapteq recording."""
 
 import json
 from pathlib import Path
@@ -24,7 +24,7 @@ def import_recording(
     """Write one recording: units in SI, all channels on one rate, clocks aligned; what was done is said.
 
     Without a map, tables and arrays whose names say units are understood (time [s], fx [N], x_mm, ...), so are files
-    that one map of ours fits, and recordings of ours; for other files a map to be completed is printed.
+    that a shipped map fits, and hapteq recordings; for other files a map to be completed is printed.
     """
     from study.cli.progress import late_bar
     from study.importing.map_format.map_errors import MapNeededError

@@ -105,12 +105,12 @@ def map_by_header(folder: Path) -> FoundMap:
     """A map from headers, for a folder without one; the file names must be alike except for numbers. Raises
     WrongUseError, MapNeededError, CannotReadError, ImportRefusedError."""
     data = sorted((path for path in folder.iterdir() if path.is_file() and path.suffix not in NO_DATA), key=_in_order)
-    none = f"No map is for the files of the folder {folder.name}: there is none in it, and none of ours fits"
+    none = f"No map is for the files of the folder {folder.name}: there is none in it, and no shipped map fits"
     if not data:
         raise _unclear(f"{none}.", "Give the files.")
     if any(is_hdf5(path) and format_of(path) == FORMAT for path in data):
         raise _unclear(
-            f"{none}; recordings of ours are in it.", "Give these recordings, to hapteq import, look or diagnose."
+            f"{none}; it has hapteq recordings.", "Give these recordings, to hapteq import, look or diagnose."
         )
     if len({_NUMBER.sub("#", path.name) for path in data}) > 1:
         shown = ", ".join(path.name for path in data[:_SHOWN])

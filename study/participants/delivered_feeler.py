@@ -1,13 +1,19 @@
-"""Simulated participant who feels what the device delivered, not what was commanded.
+"""Simulated participant whose answers depend on the acceleration that the device delivered, not on the commanded force.
 
-The direction is felt as far as the motion has one: motion along the direction counts, motion across it takes away, and
-where both are equally strong (a circle) there is no direction left. So the felt amplitude is sqrt(along^2 - across^2).
-Harmonics mask: they add to the threshold as independent noise does, in squares. Vibration numbs: the threshold rises
-within a run and is back after the rest.
+Model. With a and c the delivered amplitudes along and across the played direction, h that of the harmonics (m/s²), k
+the trial within the run and T the threshold of the undisturbed direction (m/s²), the participant answers as a
+`direction_feeler` would to
 
-The rest is signal detection over a Weibull curve in m/s², as with `direction_feeler`: thresholds there, in newtons,
-times what the simulated omega.3 delivers per newton. All numbers are assumptions of ours. Before anything was measured
-(no device, less than a period, a detection trial) the commanded level counts as delivered without a flaw.
+    sqrt(a² - c²) / sqrt(1 + (m h / T)²) · 10^(-A (1 - exp(-k / tau)) / 20)
+
+* Direction: motion across takes direction away; where both are equally strong (a circle) the motion has no direction.
+* Masking: harmonics act as independent noise, which adds to the threshold in squares (factor m).
+* Adaptation: vibration numbs, so that the threshold rises by up to A dB within a run and is back after the rest.
+
+The amplitude is converted to newtons by what the simulated omega.3 delivers per newton (`MPS2_PER_N`), because the
+thresholds of `direction_feeler` are forces. The model and its numbers m, A and tau are assumptions of the authors.
+Where nothing was measured (no device, less than a period, a detection trial), the commanded force counts as delivered
+without disturbance.
 """
 
 import math
@@ -19,7 +25,8 @@ from study.participants.observer import PerceivedStimulus, Reply
 from study.participants.psychometric_curve import threshold_at
 
 MPS2_PER_N = ((5.0, 1.5), (15.0, 2.7), (25.0, 2.85), (35.0, 3.1), (45.0, 3.6))
-"""(Hz, m/s² per N) along a direction: medians of four rehearsed sessions near the thresholds there."""
+"""(Hz, m/s² per N): acceleration along a direction that the simulated omega.3 delivers per newton; medians of four
+rehearsed sessions at levels near the thresholds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,11 +37,11 @@ class DeliveredFeeler:
     feeler: DirectionFeeler
     """Thresholds, slope, lapses and criterion."""
     masking: float = 1.0
-    """Factor by which a harmonic amplitude adds to the threshold, in squares; 0: not at all."""
+    """m: weight of the harmonics' amplitude in the threshold; 0: harmonics do not mask."""
     adaptation_db: float = 1.0
-    """Rise of the threshold in a long run."""
+    """A: rise of the threshold in a long run (dB)."""
     adaptation_trials: float = 20.0
-    """Time constant of adaptation, in trials of a run."""
+    """tau: time constant of adaptation, in trials of a run."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """The answer to one presentation."""
@@ -45,13 +52,14 @@ class DeliveredFeeler:
         return self.feeler.share_right(replace(felt, level_n=self.felt_n(felt)))
 
     def felt_n(self, felt: PerceivedStimulus) -> float:
-        """The commanded force that would be told as well, delivered without a flaw and before any adaptation."""
+        """The force (N) which, delivered without disturbance and before adaptation, would be felt as well as this
+        trial."""
         delivered = felt.delivered
         if felt.phase is Phase.DETECTION or delivered is None:
             return felt.level_n
         per_newton = threshold_at(MPS2_PER_N, felt.frequency_hz)
         threshold_mps2 = per_newton * threshold_at(self.feeler.thresholds_n, felt.frequency_hz)
         directed = math.sqrt(max(0.0, delivered.along_mps2**2 - delivered.off_axis_mps2**2))
-        raised = math.hypot(1.0, self.masking * (delivered.harmonics_mps2 or 0.0) / threshold_mps2)
-        numb_db = self.adaptation_db * -math.expm1(-felt.trial / self.adaptation_trials)
-        return directed / per_newton / raised * float(10.0 ** (-numb_db / 20.0))
+        masked = math.hypot(1.0, self.masking * (delivered.harmonics_mps2 or 0.0) / threshold_mps2)
+        adapted_db = self.adaptation_db * -math.expm1(-felt.trial / self.adaptation_trials)
+        return directed / per_newton / masked * float(10.0 ** (-adapted_db / 20.0))

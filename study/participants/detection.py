@@ -1,5 +1,5 @@
 """Detection thresholds of simulated participants: whether a vibration is felt, regardless of its direction. All numbers
-are assumptions of ours.
+are assumptions of the authors.
 
 Detecting a vibration takes a much lower level than telling its direction, and hardly rises from 5 to 45 Hz: where the
 direction is not felt, the vibration still is.

@@ -1,8 +1,8 @@
 """A population of simulated participants with individual thresholds that rise with frequency.
 
-All numbers are assumptions of ours, chosen such that a study of ten resembles the published figure 2: lowest threshold
-at 5 Hz, a significant rise at 35 Hz, some participants at the cap there, 45 Hz similar to 35 Hz. No published threshold
-is copied.
+All numbers are assumptions of the authors, chosen such that a study of ten resembles the published figure 2: lowest
+threshold at 5 Hz, a significant rise at 35 Hz, some participants at the cap there, 45 Hz similar to 35 Hz. No published
+threshold is copied.
 """
 
 from dataclasses import replace

@@ -36,7 +36,7 @@ class Seat(Protocol):
         ...
 
     def withdraw(self) -> None:
-        """Take the consent back during the next pause, and confirm it."""
+        """Withdraw the consent during the next pause, and confirm it."""
         ...
 
 

@@ -96,7 +96,7 @@ OPTIONAL_ROOMS = (
     "analysis.diagnosis.forces.force_views",  # only where forces are compared
     "analysis.diagnosis.balance",  # only without a given model, or where the search leaves something unexplained
     "analysis.diagnosis.confirm.confirm_laws",  # only where a balance names laws
-    "analysis.diagnosis.confirm.measures_of_balances",
+    "analysis.diagnosis.confirm.force_balance_measures",
     "analysis.diagnosis.confirm.decide_with_model",  # only where a search with a given model leaves something open
     "analysis.diagnosis.data.force_constant",  # only where commands are currents
     "analysis.diagnosis.search.impacts",  # only where the search leaves something open

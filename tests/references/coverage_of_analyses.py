@@ -98,13 +98,25 @@ def measure(studies: int) -> list[MeasuredCoverage]:
     return sorted(rows, key=lambda row: (row.analysis, row.frequency_hz))
 
 
+MODULE_DOCSTRING = '''"""Measured coverage near the force cap: how many intervals of a study report hold the true value.
+
+Reports print these counts beside each interval (`coverage_words`). Each row: analysis (`coverage_words.NAMES`),
+frequency (Hz; 0 where all frequencies are judged together), mean error (dB; None where the analysis gives no size in
+dB), intervals of 95 % that held the truth (one-way: studies in which a difference was found that was not there), and
+all intervals.
+
+Counted in simulated studies of ten people with known thresholds under the published staircase and cap, and written by
+`make coverage` (tests/references/coverage_of_analyses.py), never by hand; docs/statistics.md has the same table.
+"""'''
+
+
 def module_text(rows: list[MeasuredCoverage]) -> str:
     lines = "\n".join(
         f'    MeasuredCoverage("{row.analysis}", {row.frequency_hz}, {row.bias_db}, {row.covered}, {row.intervals}),'
         for row in rows
     )
     return (
-        '"""Counted by `make coverage` (tests/references/coverage_of_analyses.py), not written by hand."""\n\n'
+        f"{MODULE_DOCSTRING}\n\n"
         "from analysis.psychophysics.coverage.coverage_words import MeasuredCoverage\n\n"
         f"MEASURED = (\n{lines}\n)\n"
     )

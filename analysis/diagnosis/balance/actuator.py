@@ -282,4 +282,4 @@ def _why_not(law: CommandLaw, gain: float, low: float, alike: tuple[str, ...]) -
     different = [effect for effect in alike if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
     if different or len(alike) >= LARGEST_CLASS:
         return f"these data cannot tell it from {', '.join(alike)}"
-    return "" if law.effect in EFFECTS_BY_NAME or law.formula else "no simulation of ours plays it yet"
+    return "" if law.effect in EFFECTS_BY_NAME or law.formula else "hapteq cannot simulate it yet"

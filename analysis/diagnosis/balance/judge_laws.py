@@ -264,7 +264,7 @@ def _why_not(
     if of_other_family or (len(others) >= LARGEST_CLASS and not {law.effect, *others} <= DRY_FRICTIONS):
         return f"these data cannot tell it from {', '.join(of_other_family or alike)}"
     played = law.formula is not None or not {law.effect, PLAYED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
-    return "" if played else "no simulation of ours plays it yet"
+    return "" if played else "hapteq cannot simulate it yet"
 
 
 def _judge_further_laws(

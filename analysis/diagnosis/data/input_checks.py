@@ -242,7 +242,7 @@ def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> 
     elif (apart := int(np.linalg.matrix_rank(model.input))) < model.inputs:
         yield (
             f"the model's {model.inputs} inputs drive only {apart} motion{'s' if apart != 1 else ''}, so they cannot "
-            "be told apart; make one command of those that push the same"
+            "be distinguished; make one command of those that push the same"
         )
     if unconnected:
         yield f"the model's output lets {', '.join(unconnected)} see nothing"

@@ -1,11 +1,12 @@
-"""Spectral lines of a recording: which are driven, which are silent, and whether their power is more than noise.
+"""Spectral lines of a periodic recording: which are driven, which are silent, and whether their power exceeds the
+noise.
 
-A linear device responds on driven lines only. Where all driven lines are odd multiples of one, odd distortion falls on
-odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon 2016). The lines are taken from the measured
-excitation, so that any multisine with silent lines is suitable.
+A linear device responds on driven lines only. Where all driven lines are odd multiples of one line, odd distortion
+falls on odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon, IEEE Control Systems 36 (2016), 38).
+The lines are read from the measured excitation, so that any multisine with silent lines is suitable.
 
-Lines are tested in octaves that begin at powers of two, the same for all recordings, so that results for a band of
-different recordings can be compared. The power of lines over noise has an F distribution.
+Lines are tested in octaves that begin at powers of 2 Hz, the same for all recordings, so that results of different
+recordings can be compared band by band. The ratio of the power on silent lines to that of the noise is F-distributed.
 """
 
 from dataclasses import dataclass
@@ -21,9 +22,11 @@ Band = tuple[float, float]
 """Lower edge (Hz), included, and upper edge (Hz), excluded."""
 _SILENT = 3e-3
 """Largest amplitude of a silent line, relative to the strongest line of its input, or to a tenth of the strongest of
-all inputs if that is more. By hand."""
+all inputs if that is more. Chosen by hand."""
 _DRIVEN = 0.01
-"""Least power of a driven input, relative to the strongest. By hand."""
+"""Least power of a driven input, relative to the strongest. Chosen by hand."""
+_FEW_CHANGES = 16
+"""Up to so many changes of a command do not show for how many samples it holds a value."""
 _TINY = np.finfo(np.float64).tiny
 _LARGEST = 1e300
 """Upper limit of an F ratio: SciPy returns NaN for infinity."""
@@ -31,15 +34,16 @@ _LARGEST = 1e300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectionLines:
-    """Masks (lines,), within the driven band."""
+    """Driven lines and the silent ones between them, as masks (lines,); row 0 is line 1, the inverse of the period."""
 
     driven: Mask
+    """Lines that the excitation drives, of any input."""
     odd: Mask
     """Silent lines that only odd distortion reaches."""
     even: Mask
     """Silent lines that only even distortion reaches."""
     either: Mask
-    """Silent lines that both reach, because even lines were driven, too."""
+    """Silent lines that odd and even distortion reach, because even lines were driven, too."""
     step: int
     """Greatest common divisor of the driven lines' numbers: lines between its multiples detect noise only."""
 
@@ -50,9 +54,12 @@ class DetectionLines:
 
 
 def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines | None:
-    """Driven lines of a periodic excitation, and silent ones on which distortion shows. excitation: (lines, inputs),
-    line k in row k - 1. held: samples for which each value of the command is held; above half of the command's own rate
-    there are only images. None where nothing is driven."""
+    """Driven lines of a periodic excitation, and the silent ones on which distortion shows; None where nothing is
+    driven.
+
+    excitation: (lines, inputs), spectrum of one period, line k in row k - 1. held: samples for which each value of the
+    command is held; above half of the rate at which it changes there are only images, which count as not driven.
+    """
     size = np.abs(excitation)
     size[(len(size) + 1) // held :] = 0
     strongest = size.max()
@@ -74,27 +81,28 @@ def detection_lines(excitation: ComplexArray, held: int = 1) -> DetectionLines |
 
 
 def hold_length(command: npt.NDArray[np.float64]) -> int:
-    """Number of samples for which each value of the command is held: greatest common divisor of the distances between
-    its changes; 1 where it hardly changes. command: (n, inputs)."""
+    """Number of samples for which each value of the command is held: the greatest common divisor of the distances
+    between its changes; 1 where it changes too seldom to show that. command: (n, inputs)."""
     moves = np.flatnonzero(np.any(np.diff(command, axis=0) != 0, axis=1))
-    return int(np.gcd.reduce(np.diff(moves))) if len(moves) > 16 else 1
+    return int(np.gcd.reduce(np.diff(moves))) if len(moves) > _FEW_CHANGES else 1
 
 
 def octaves_between(from_hz: float, to_hz: float) -> tuple[Band, ...]:
-    """All octaves that overlap the interval; a last line on an edge opens its own octave. Both must be positive."""
+    """All octaves [2^k, 2^(k+1)) Hz that overlap the closed interval from `from_hz` to `to_hz`, both positive; so an
+    upper end at 2^k adds the octave from 2^k."""
     first = int(np.floor(np.log2(from_hz) + 1e-9))
     last = int(np.floor(np.log2(to_hz) + 1e-9))
     return tuple((2.0**power, 2.0 ** (power + 1)) for power in range(first, last + 1))
 
 
 def lines_in_band(frequency_hz: FloatArray, band_hz: Band) -> Mask:
-    """(lines,): lower edge included, upper edge excluded."""
+    """(lines,): lines within the band, its lower edge included and its upper edge excluded, apart from rounding."""
     return np.asarray((frequency_hz >= band_hz[0] * (1 - 1e-9)) & (frequency_hz < band_hz[1] * (1 - 1e-9)))
 
 
 def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the inputs that were driven in a segment. power: (inputs,). An input that only reacts, by feedback,
-    stays below a hundredth of the strongest where the excitation was recorded."""
+    """Names of the inputs that were driven in a segment: those with more than a hundredth of the power of the
+    strongest. An input that is only moved by feedback has less, where the excitation was recorded. power: (inputs,)."""
     if power.max(initial=0.0) == 0:
         return ()
     return tuple(name for name, strength in zip(channels, power, strict=True) if strength > _DRIVEN * power.max())

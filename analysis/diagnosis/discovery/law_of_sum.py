@@ -19,7 +19,7 @@ _SIGNAL = re.compile(rf"\b([vfa]?)([{AXES}])\b")
 def law_of_sum(of: Sum, recording: Recording) -> Law:
     """The sum as a law: p0 is the first term's factor, then its parameters, then the next term's. The grammar calls the
     driven axes and the channels of the response x, y, z in their order; the law calls them as the recording does. What
-    hangs on commands alone and remembers nothing is a law of the command: then it can be undone."""
+    depends on commands alone and remembers nothing is a law of the command: then it can be undone."""
     channels = law_channels(recording)
     names, readings = axis_names(channels.inputs), names_of_readings(channels)
     parts: list[str] = []

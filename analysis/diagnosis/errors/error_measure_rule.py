@@ -36,8 +36,8 @@ Measure = Literal["free simulation", "windows", "predicted force"]
 WINDOW_S = 1.0
 """Shortest window (s)."""
 UNTIMED = (
-    "No time is known: forces are compared as they stand beside the positions, sample by sample; nothing that hangs on "
-    "speed, acceleration or frequency is known."
+    "No time is known: forces are compared as they stand beside the positions, sample by sample; nothing that depends "
+    "on speed, acceleration or frequency is known."
 )
 IN_SAMPLES = (
     "No time is known: each sample is counted as one second, so that every time, speed and frequency is per sample."
@@ -47,15 +47,15 @@ IMPOSED = (
     "with the measured one."
 )
 CLOSED_LOOP = (
-    "The command hangs on the response and the model does not hold itself, so a simulation by the command alone would "
-    "drift; the force that the model needs along the measured motion is compared with the one that entered."
+    "The command depends on the response and the model does not hold itself, so a simulation by the command alone "
+    "would drift; the force that the model needs along the measured motion is compared with the one that entered."
 )
 UNSTABLE = (
     "By itself the model grows without end, so the device was held by a controller, and simulations say nothing; the "
     "force that the model needs along the measured motion is compared with the one that entered."
 )
 CLOSED_LOOP_WINDOWS = (
-    "The command hangs on the response and the model does not hold itself; it is simulated in short windows, each "
+    "The command depends on the response and the model does not hold itself; it is simulated in short windows, each "
     "from a state estimated from the measured motion."
 )
 DRIFTS = (

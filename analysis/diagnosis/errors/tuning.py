@@ -1,7 +1,15 @@
-"""The free parameters of a mechanical model within the tolerances of its calibration, and the model that they give.
+"""Re-tuning: the free parameters of a mechanical model within the tolerances of its calibration.
 
-Free are the grounded mass, damping and stiffness at the driven axes and, for every mode with these axes held, its
-frequency, mass and damping (coordinates of Craig and Bampton 1968: driven axes and fixed-interface modes).
+Before physics is called missing, the parameters of the given model may move by a few standard deviations of their
+calibration. The model M q'' + B q' + K q = input is first written in the coordinates of Craig and Bampton (AIAA Journal
+6 (1968), 1313): the m driven axes, and the modes with these axes held (fixed-interface modes), scaled to unit mass.
+Free are then
+
+* each entry of the m x m blocks of mass, damping and stiffness at the driven axes (an absolute change);
+* of each mode k its frequency f, mass and damping ratio (relative changes df, dm, dz):  K_kk (1 + df)², the coupling to
+  the axes times sqrt(1 + dm), and B_kk (1 + df) (1 + dz).
+
+`tuning_of` makes a `Tuning`, whose function `tune` maps deviations, in standard deviations, to a model.
 """
 
 from collections.abc import Callable
@@ -23,23 +31,28 @@ from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
 UNSTATED = Tolerance(modes=UNSTATED_MODES)
+"""Tolerance of a model that states none; grounded parameters have `UNSTATED_SHARE` of the largest at any axis."""
 DAMPING_PER_MODES = 10.0
-"""Relative uncertainty of a mode's damping over that of its frequency."""
-
-
+"""Relative uncertainty of a mode's damping over that of its frequency. Chosen by hand: damping is identified far less
+accurately."""
 ROUNDING = 1e-9
-"""Share of a matrix's largest element by which an eigenvalue may be negative."""
+"""Share of a matrix's largest element by which an eigenvalue may be negative by rounding."""
+_LEAST_MASS = 1e-3
+"""Least factor on a mode's mass, so that its square root exists for any deviation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tuning:
-    """`model` with the parameters `names` free, counted in standard deviations of the calibration."""
+    """A model and its free parameters, whose changes are counted in standard deviations of the calibration."""
 
     model: MechanicalModel
     names: tuple[str, ...]
+    """Names of the parameters: mass, damping, stiffness of each pair of axes, then frequency, mass, damping of each
+    mode."""
     deviation: FloatArray
-    """(parameters,): one standard deviation, SI or relative."""
+    """(parameters,): one standard deviation, in `units`."""
     units: tuple[str, ...]
+    """Units of the parameters; "1" for the relative changes of modes."""
     tune: Callable[[FloatArray], MechanicalModel]
     """The model with its parameters changed by deviations (parameters,), in standard deviations. Raises
     MechanicalModelError where the mass is not positive definite."""
@@ -47,17 +60,19 @@ class Tuning:
     """Standard deviations of the calibration by which a parameter may move at most."""
 
     def with_wider_bound(self) -> "Tuning":
-        """The same parameters with a bound beyond what a calibration allows: of a model that was fitted to the same
-        device with the missing physics in it, whose stated tolerance does not hold that bias."""
+        """The same parameters with the bound `WIDER_RETUNING_BOUND`, beyond what a calibration allows. For a model that
+        was fitted to a recording of the same device with the missing physics in it: that physics biased the parameters
+        by more than the stated tolerance."""
         return replace(self, bound=WIDER_RETUNING_BOUND)
 
     def is_at_bound(self, deviations: FloatArray) -> bool:
-        """Whether a parameter has moved as far as it may. deviations: (parameters,)"""
+        """Whether a parameter has moved to its bound, or nearly. deviations: (parameters,), in standard deviations."""
         return bool(np.abs(deviations).max(initial=0.0) >= AT_RETUNING_BOUND * self.bound)
 
     def is_possible(self, deviations: FloatArray) -> bool:
-        """Whether damping and stiffness with these deviations (parameters,) are no less definite than those of the
-        given model: beyond the calibration a parameter may vanish or change its sign. Raises as `tune`."""
+        """Whether damping and stiffness stay physical with these deviations (parameters,): positive semidefinite, or no
+        more indefinite than in the given model. With the wider bound a parameter may vanish or change its sign. Raises
+        as `tune`."""
         tuned, given = self.tune(deviations), self.model
         return _is_as_definite(tuned.damping, given.damping) and _is_as_definite(tuned.stiffness, given.stiffness)
 
@@ -67,7 +82,8 @@ class Tuning:
 
 
 def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning:
-    """The parameters with a tolerance in the model; a tenth is assumed where it states none."""
+    """The free parameters of a model. Where it states no tolerance of mass, damping or stiffness, `UNSTATED_SHARE` of
+    the largest at any axis is one standard deviation. input_channels: names of the driven axes."""
     split = _split(model)
     m = model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
@@ -112,7 +128,7 @@ def _is_as_definite(matrix: FloatArray, given: FloatArray) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Split:
-    """Mass, damping and stiffness with the driven axes first, then the modes of unit mass."""
+    """Mass, damping and stiffness in Craig-Bampton coordinates: the driven axes first, then the modes of unit mass."""
 
     mass: FloatArray
     damping: FloatArray
@@ -123,25 +139,29 @@ class _Split:
 
 
 def _read_stated_deviation(stated: float | None, grounded: FloatArray) -> float:
+    """One standard deviation of the entries of a block (m, m) at the driven axes; also above 0 where the block is 0."""
     if stated is not None:
         return stated
     return UNSTATED_SHARE * float(np.abs(np.diagonal(grounded)).max()) or UNSTATED_SHARE
 
 
 def _split(model: MechanicalModel) -> _Split:
+    """The model in Craig-Bampton coordinates: constraint modes (static shapes) of the driven axes, then fixed-interface
+    modes."""
     driven = driven_axes(model)
-    inside = null_space(driven.T)
+    inner = null_space(driven.T)
     m = driven.shape[1]
     # Dual basis of the driven axes, so that a force along one axis moves that axis alone.
     axes = driven @ np.linalg.inv(driven.T @ driven)
     basis = axes
     frequency = np.zeros(0)
-    if inside.shape[1]:
-        held, carrying = inside.T @ model.stiffness @ inside, inside.T @ model.mass @ inside
-        squares, shapes = eigh((held + held.T) / 2, carrying)
-        frequency = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
-        carried = -np.linalg.lstsq(held, inside.T @ model.stiffness @ axes, rcond=None)[0]
-        basis = np.hstack([axes + inside @ carried, inside @ shapes])
+    if inner.shape[1]:
+        inner_stiffness, inner_mass = inner.T @ model.stiffness @ inner, inner.T @ model.mass @ inner
+        eigenvalues, shapes = eigh((inner_stiffness + inner_stiffness.T) / 2, inner_mass)
+        frequency = np.sqrt(np.maximum(eigenvalues, 0.0)) / (2 * np.pi)
+        # Static deflection of the inner coordinates with the axes, so that axes and modes share no stiffness.
+        static = -np.linalg.lstsq(inner_stiffness, inner.T @ model.stiffness @ axes, rcond=None)[0]
+        basis = np.hstack([axes + inner @ static, inner @ shapes])
     mass, damping, stiffness = (
         np.asarray(basis.T @ matrix @ basis) for matrix in (model.mass, model.damping, model.stiffness)
     )
@@ -151,9 +171,10 @@ def _split(model: MechanicalModel) -> _Split:
 
 
 def _tune(model: MechanicalModel, split: _Split, pairs: list[tuple[int, int]], values: FloatArray) -> MechanicalModel:
+    """The model with its parameters changed by `values` (parameters,), in their units; equations: see above."""
     m, modes = model.inputs, len(split.frequency_hz)
     grounded = values[: 3 * len(pairs)].reshape(3, len(pairs))
-    frequency, weight, loss = values[3 * len(pairs) :].reshape(3, modes)
+    frequency_change, mass_change, damping_change = values[3 * len(pairs) :].reshape(3, modes)
     matrices = [split.mass.copy(), split.damping.copy(), split.stiffness.copy()]
     for matrix, added in zip(matrices, grounded, strict=True):
         for (i, j), value in zip(pairs, added, strict=True):
@@ -162,11 +183,12 @@ def _tune(model: MechanicalModel, split: _Split, pairs: list[tuple[int, int]], v
     mass, damping, stiffness = matrices
     for k in range(modes):
         row = m + k
-        carried, heavier = split.mass[:m, row], max(1 + weight[k], 1e-3)
-        mass[:m, :m] += (heavier - 1) * np.outer(carried, carried)
-        mass[:m, row] *= np.sqrt(heavier)
-        mass[row, :m] *= np.sqrt(heavier)
-        stiffness[row, row] *= (1 + frequency[k]) ** 2
-        damping[row, row] *= (1 + frequency[k]) * (1 + loss[k])
+        coupling, factor = split.mass[:m, row], max(1 + mass_change[k], _LEAST_MASS)
+        # A mode of unit mass adds coupling coupling^T to the mass that the axes carry at low frequencies.
+        mass[:m, :m] += (factor - 1) * np.outer(coupling, coupling)
+        mass[:m, row] *= np.sqrt(factor)
+        mass[row, :m] *= np.sqrt(factor)
+        stiffness[row, row] *= (1 + frequency_change[k]) ** 2
+        damping[row, row] *= (1 + frequency_change[k]) * (1 + damping_change[k])
     mass, damping, stiffness = (split.back.T @ matrix @ split.back for matrix in matrices)
     return replace(model, mass=(mass + mass.T) / 2, damping=damping, stiffness=stiffness)

@@ -1,18 +1,21 @@
-"""Nonlinear distortion by kind (odd, even, varying), from repeats and from silent lines of a periodic excitation, by
-channel, input, level and band. `Distortions.remarks` names the kinds that the recording cannot show.
+"""Nonlinear distortion by kind (odd, even, varying), from the repeated periods and the silent lines of a periodic
+excitation: one figure per channel, input, level and band. `Distortions.remarks` names the kinds that the recording
+cannot show.
 
-Theory of operation. A linear, time-invariant device responds to a multisine on its driven lines only. Where all of
-these are odd multiples k f0, a term of odd order in the motion (friction, backlash, a cubic spring) makes sums and
-differences of an odd number of odd lines, which are odd; a term of even order makes even lines. So the response's power
-on driven multiples that were left silent, beyond the noise, is the distortion, and its parity shows the kind. Some odd
-lines must be left out of the excitation for that (detection lines). Per kind and band, over the silent lines S,
+Theory. A linear, time-invariant device responds to a multisine on its driven lines only. Where all driven lines are odd
+multiples k f0, a term of odd order in the motion (friction, backlash, a cubic spring) makes sums and differences of an
+odd number of odd lines, which are odd; a term of even order makes even lines. So the power of the response on multiples
+that were left silent (detection lines), beyond the noise, is distortion, and the parity of the line shows the kind. Per
+kind and band, with S the set of silent lines of that kind,
 
-    D² = 2 L/|S| sum_S (|Y(k)|² - E|N(k)|²)     Y: mean over periods, N: its noise, L: lines that the kind reaches
+    D² = 2 L/|S| sum over k in S of (|Y(k)|² - E|N(k)|²)
 
-since the distortion of driven lines, hidden under the response, is taken to be as strong as on their silent neighbours.
-What differs between periods more than the noise ("varying") is no function of a periodic motion: drift, a moving hand,
-friction that depends on its history. Its power is the variance between periods beyond the noise's. p-values: the ratio
-of the power to the noise's is F-distributed (`spectral_lines.excess`).
+    Y: mean spectrum over the periods; N: its noise; L: number of lines, driven ones included, that the kind reaches
+
+because distortion of driven lines, which the response hides, is taken to be as strong as on the silent lines next to
+them. What differs between periods by more than the noise ("varying") is no function of a periodic motion: drift, a
+moving hand, friction that depends on its history. Its power is the variance between periods beyond that of the noise.
+p-values: the ratio of the power to the power of the noise is F-distributed (`spectral_lines.excess`).
 
 References: Pintelon and Schoukens, System Identification: A Frequency Domain Approach (2012), chapter 4; Schoukens,
 Vaes and Pintelon, IEEE Control Systems 36 (2016), 38.
@@ -46,8 +49,8 @@ Kind = Literal["odd", "even", "either", "varying"]
 noise."""
 
 
-class _Where(NamedTuple):
-    """The first five fields of a `Distortion`."""
+class _Cell(NamedTuple):
+    """What a figure of distortion is about: the first five fields of a `Distortion`."""
 
     output: str
     quantity: str
@@ -58,9 +61,10 @@ class _Where(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Distortion:
-    """One kind of distortion in one cell."""
+    """One kind of distortion of one output channel, at one input, level and band (a cell)."""
 
     output: str
+    """Name of the channel."""
     quantity: str
     """Quantity of the output: position and response channels may share a name."""
     input: str
@@ -75,11 +79,11 @@ class Distortion:
     """Rms distortion in the output's unit, over all lines of the band that this kind reaches; 0 where not above the
     noise."""
     limit_rms: float
-    """Detection limit, rms in the output's unit."""
+    """Detection limit, rms in the output's unit: two standard errors of the noise."""
     signal_rms: float
-    """Rms response on the driven lines."""
+    """Rms response on the driven lines of the band, in the output's unit."""
     p_value: float
-    """p-value: probability of such a value from noise alone."""
+    """Probability of at least so much power from noise alone."""
     lines: int
     """Number of lines that were evaluated."""
 
@@ -93,17 +97,20 @@ class Distortions:
 
 
 def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
-    """Distortion per channel of response and position x input x level x (whole driven band and each octave of it).
-    floor: the recording's noise; where it is not known, no cell is evaluated and a remark says so."""
+    """Distortion of each channel of response and position, per input, level and band (the whole driven band and each
+    octave of it).
+
+    floor: the recording's noise; where it is not known, no cell is evaluated and a remark says so.
+    """
     if not floor.known:
-        return Distortions((), ("The noise is not known, so no distortion can be told from it.",))
+        return Distortions((), ("The noise is not known, so distortion cannot be distinguished from it.",))
     found = find_settled_periods(recording)
     excitation = instrument_signal(recording)
     held = hold_length(excitation)
     lines = [detection_lines(period_spectra(excitation, period).mean(axis=0), held) for period in found]
-    periods = [(period, its) for period, its in zip(found, lines, strict=True) if its is not None]
+    periods = [(period, detecting) for period, detecting in zip(found, lines, strict=True) if detecting is not None]
     if not periods:
-        return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be told apart.",))
+        return Distortions((), ("Nothing is periodic in this recording: kinds of distortion cannot be distinguished.",))
     signals = [(recording.response, floor.response)]
     if recording.position is not None and floor.position is not None:
         signals.append((recording.position, floor.position))
@@ -115,23 +122,25 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
 
 
 def _untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
+    """Sentences on the kinds of distortion that this excitation cannot show, and why."""
     remarks = []
     if all(period.count < 2 for period, _ in periods):
-        remarks.append("No period was repeated: what varies from period to period cannot be seen.")
+        remarks.append("No period was repeated: variation from period to period cannot be measured.")
     if not all(period.settled for period, _ in periods):
-        remarks.append("Some segments have one period only: its transient counts as distortion.")
+        remarks.append("Some segments have one period only: the transient at its start counts as distortion.")
     if len({period.segment.amplitude for period, _ in periods}) < 2:
-        remarks.append("There is one level only: how distortion changes with level cannot be seen.")
+        remarks.append("There is one level only: how distortion changes with the level cannot be measured.")
     if not any(lines.any_silent for _, lines in periods):
-        remarks.append("No line was left silent between driven ones: distortion cannot be told from the response.")
+        remarks.append("No line was left silent: distortion on driven lines cannot be distinguished from the response.")
     elif not any(lines.even.any() for _, lines in periods):
-        remarks.append("Even lines were driven, too: odd and even distortion cannot be told apart.")
+        remarks.append("Even lines were driven, too: odd and even distortion cannot be distinguished.")
     elif not any(lines.odd.any() for _, lines in periods):
-        remarks.append("Every odd line was driven: odd distortion cannot be told from the response.")
+        remarks.append("Every odd line was driven: odd distortion cannot be distinguished from the response.")
     return remarks
 
 
 def _cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion]:
+    """The distortions of all channels and bands of one segment."""
     lowest, highest = (float(line) for line in spectrum.frequency_hz[spectrum.lines.driven][[0, -1]])
     cells = []
     octaves = octaves_between(lowest, highest)
@@ -139,13 +148,13 @@ def _cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion]:
         inside = lines_in_band(spectrum.frequency_hz, band)
         if (inside & spectrum.lines.driven).any():
             for number, name in enumerate(signal.channels):
-                where = _Where(name, signal.quantities[number], spectrum.input, spectrum.amplitude, band)
-                cells += _kinds(spectrum, number, inside, where, band == (octaves[0][0], octaves[-1][1]))
+                cell = _Cell(name, signal.quantities[number], spectrum.input, spectrum.amplitude, band)
+                cells += _kinds(spectrum, number, inside, cell, band == (octaves[0][0], octaves[-1][1]))
     return cells
 
 
-def _kinds(spectrum: SegmentSpectrum, channel: int, inside: Mask, where: _Where, whole: bool) -> list[Distortion]:
-    """All kinds of distortion in one cell. inside: (lines,), the lines of its band."""
+def _kinds(spectrum: SegmentSpectrum, channel: int, inside: Mask, cell: _Cell, whole: bool) -> list[Distortion]:
+    """All kinds of distortion in one cell. inside: (lines,), the lines of its band. whole: the whole driven band."""
     power, error = np.abs(spectrum.mean[:, channel]) ** 2, spectrum.error[:, channel]
     signal_rms = float(np.sqrt(2 * np.sum(power[inside & spectrum.lines.driven])))
     found: list[tuple[Kind, tuple[float, float, float], float, int]] = []
@@ -165,7 +174,7 @@ def _kinds(spectrum: SegmentSpectrum, channel: int, inside: Mask, where: _Where,
         )
         found.append(("varying", beyond, 1 / (spectrum.count - 1), int(inside.sum())))
     return [
-        Distortion(*where, whole, kind, _rms(share * beyond), _rms(share * limit), signal_rms, p_value, lines)
+        Distortion(*cell, whole, kind, _rms(share * beyond), _rms(share * limit), signal_rms, p_value, lines)
         for kind, (beyond, limit, p_value), share, lines in found
     ]
 
@@ -184,5 +193,7 @@ def _detection_masks(spectrum: SegmentSpectrum, inside: Mask) -> list[tuple[Kind
 
 
 def _rms(power: float) -> float:
-    """Rms from the sum of squared magnitudes of a one-sided spectrum."""
+    """Rms from a sum of squared magnitudes of a one-sided spectrum of complex amplitudes divided by the number of
+    samples: a sine of peak A has the magnitude A/2, and A²/2 = 2 (A/2)². Negative sums, which noise alone gives, count
+    as 0."""
     return float(np.sqrt(2 * max(power, 0.0)))

@@ -167,7 +167,7 @@ def place_of(mismatch: Mismatch, device: Device | None = None) -> str:
 
 def next_experiment_sentence(diagnosis: Diagnosis) -> str:
     """Sentences on the recording to make next and why; where none is foreseen, empty or, with rivals that cannot be
-    told apart, a sentence that says so."""
+    distinguished, a sentence that says so."""
     wanted = diagnosis.next_experiment
     if wanted is None:
         alike = any(rival.inseparable for effect in diagnosis.effects for rival in effect.rivals)

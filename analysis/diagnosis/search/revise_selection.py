@@ -1,9 +1,9 @@
-"""Revises what forward selection found: an effect is exchanged, or dropped (backward elimination).
+"""Revises the effects that forward selection found: exchanges one for another, or drops one (backward elimination).
 
-Forward selection chooses the first effect for what all of them do together, so that it may be a compromise. With the
-second effect held, the first is looked for again; where another one fits better, it takes the first one's place, and
-the second is looked for again beside it, as often as there are effects (Miller, Subset Selection in Regression, 2002,
-ch. 3).
+Forward selection chooses the first effect while it alone must explain the whole error, so that it may be a compromise.
+With the second effect kept, the first is searched again; where another effect fits better in its place, it replaces the
+first, as the last in the order. Then the next is searched again, until no effect fits better or each had its turn
+(Miller, Subset Selection in Regression, 2002, ch. 3).
 """
 
 from collections.abc import Callable, Sequence
@@ -32,8 +32,8 @@ from equalizer.effects.effect import Effect
 
 
 def without_effect(context: SearchContext, found: Explanation, number: int) -> Explanation:
-    """The explanation without one effect; those after it are refitted. number: of the effect, in the order in which
-    they were found; without the only one, the re-tuned model is left."""
+    """The explanation without one effect; the effects found after it are refitted. number: index of the effect, in the
+    order in which they were found. Without the only effect, the explanation is the re-tuned model."""
     if len(found.steps) == 1:
         return replace(found, after=found.retuned, steps=())
     earlier, later = found.steps[:number], list(found.steps[number + 1 :])
@@ -41,7 +41,7 @@ def without_effect(context: SearchContext, found: Explanation, number: int) -> E
         return replace(found, after=context.with_test_score(earlier[-1]), rounds=found.rounds[:number], steps=earlier)
     alone = [_without(context, candidate, number) for candidate in later]
     alone[-1] = context.candidate(refine(context, alone[-1].fitted))
-    # Beside effects that follow, rivals of this one were not compared.
+    # Rivals of this stage were fitted without later effects, so they can be compared with a single later one only.
     rivals = found.rounds[number] if len(alone) == 1 else ()
     others = [candidate for candidate in rivals if candidate.newest != alone[0].newest]
     rounds = (*found.rounds[:number], (alone[0], *others), *found.rounds[number + 2 :])
@@ -49,26 +49,28 @@ def without_effect(context: SearchContext, found: Explanation, number: int) -> E
 
 
 def without_last_refitted(context: SearchContext, found: Explanation) -> Explanation:
-    """The explanation without the last of several effects, the others refitted from where they are beside it: that may
-    be a better minimum than they had before."""
+    """The explanation without the last of several effects; the others are refitted from their values with it, which may
+    lead to a better minimum than the one they had before it was found."""
     last, before = len(found.steps) - 1, without_effect(context, found, len(found.steps) - 1)
     freed = context.candidate(refine(context, _without(context, found.steps[-1], last).fitted))
     if not freed.fitted.cost < before.steps[-1].fitted.cost:
         return before
-    # Rivals of the one before it were fitted beside a worse minimum.
+    # Rivals of the effect before it were compared at a worse minimum, so they are left out.
     rounds = (*before.rounds[: last - 1], (freed,))
     return replace(before, after=context.with_test_score(freed), rounds=rounds, steps=(*before.steps[:-1], freed))
 
 
 def _without(context: SearchContext, candidate: FittedCandidate, number: int) -> FittedCandidate:
+    """The candidate without its effect of this index, its other values unchanged."""
     fewer: Hypothesis = without_claim(candidate.fitted.hypothesis, number)
     return context.candidate(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, fewer))
 
 
 def drop_needless(context: SearchContext, found: Explanation, time_left: TimeBudget) -> Explanation:
-    """Drop the first of the effects without which the others fit as well: an earlier one may have stood in for a later
-    one, and the last may have led the others out of a local minimum. Of three, also the one without which the other two
-    leave least, and as little as laws of a real device do: none is exact, and a third takes up what they leave."""
+    """Drop the first effect without which the others fit as well: an earlier effect may have taken the place of a later
+    one, and the last may have led the others out of a local minimum. Of three effects, also drop the one without which
+    the other two leave the smallest error, if that is as small as laws of a real device leave: no law is exact, and a
+    third effect fits the remaining error."""
     enough, last = [], len(found.steps) - 1
     for number in range(len(found.steps) if time_left() else 0):
         others = without_effect(context, found, number) if number < last else without_last_refitted(context, found)
@@ -82,8 +84,8 @@ def drop_needless(context: SearchContext, found: Explanation, time_left: TimeBud
 
 
 def drop_unconfirmed(context: SearchContext, found: Explanation) -> Explanation:
-    """Drop a last effect that was found in a remainder as small as right laws leave of a real device, and that the
-    held-out samples do not confirm: with it they show no less."""
+    """Drop a last effect that was found in an error as small as the right laws leave on a real device, if the held-out
+    samples do not confirm it: their error is no smaller with it."""
     while len(found.steps) > 1 and found.steps[-2].score.worst_channel <= EXPLAINED_ERROR:
         if found.after.held_out < context.with_test_score(found.steps[-2]).held_out or np.isinf(found.after.held_out):
             break
@@ -92,7 +94,7 @@ def drop_unconfirmed(context: SearchContext, found: Explanation) -> Explanation:
 
 
 def drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
-    """Drop last effects that take little and leave more than noise."""
+    """Drop last effects that reduce the error by little while the error stays above the noise."""
     while len(found.steps) > 1 and not as_good_as_noise(found):
         if shares_taken(found.retuned, found.steps)[-1] >= LAST_EFFECT_SHARE:
             break
@@ -106,8 +108,8 @@ def drop_negligible(context: SearchContext, found: Explanation) -> Explanation:
 def exchange_effects(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
-    """The explanation with effects exchanged; unchanged where it leaves as little as laws of a real device do, has a
-    single effect, nothing fits better, or a law crashes."""
+    """The explanation with effects exchanged; unchanged where its error is as small as laws of a real device leave, it
+    has a single effect, no other effect fits better, or a law fails."""
     limited = replace(context, map_=limit_map(context.map_, time_left))
     for _ in found.steps:
         if not _may_exchange(context, found, time_left) or leaves_little(found.retuned, found.after):
@@ -122,6 +124,7 @@ def exchange_effects(
 def _find_first_again(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress
 ) -> tuple[Explanation, tuple[FittedCandidate, ...]]:
+    """The explanation without its first effect, and the candidates of the whole catalogue in its place."""
     kept = without_effect(context, found, 0)
     return kept, find_next_effect(context, catalogue, kept.steps[-1].fitted, _again(progress))
 
@@ -130,9 +133,12 @@ def exchange_for_relatives(
     context: SearchContext, found: Explanation, catalogue: Sequence[Effect], progress: Progress, time_left: TimeBudget
 ) -> Explanation:
     """The explanation with its first effect exchanged for one of its family, or a refinement, at the same place: which
-    of them it is may be seen only beside the second effect. They start from the whole explanation without the first
-    effect, not fitted anew, and only what then leaves less than the first effect does is fitted on. The first effect
-    is among those that are compared, so that a refinement must gain as much as in any step."""
+    of them fits best may show only when the second effect is known.
+
+    The candidates start from the whole explanation without the first effect, whose other values are not refitted; only
+    a candidate with a smaller error than the first effect is fitted further. The first effect is among the candidates,
+    so that a refinement must gain as much as in any step.
+    """
     tried = relatives(found.steps[0].newest, catalogue) if found.steps else ()
     if len(tried) < 2 or not _may_exchange(context, found, time_left):
         return found
@@ -153,7 +159,7 @@ def exchange_for_relatives(
 
 
 def _with_first_at_end(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
-    """The same fit with its first effect as the last, so that others in its place compare with it."""
+    """The same fit with its first effect last in the order, so that candidates in its place can be compared with it."""
     whole = first = candidate.fitted.hypothesis
     for number in reversed(range(1, len(whole.claims))):
         first = without_claim(first, number)
@@ -162,7 +168,8 @@ def _with_first_at_end(context: SearchContext, candidate: FittedCandidate) -> Fi
 
 
 def _may_exchange(context: SearchContext, found: Explanation, time_left: TimeBudget) -> bool:
-    """Whether there are two effects that are not fixed and leave more than noise, and time."""
+    """Whether there are two or more effects, they may be changed, the error is above `EXPLAINED_ERROR`, and time is
+    left."""
     fixed = context.certain or context.references is not None or found.ended_early or found.barred
     more = len(found.steps) > 1 and found.after.score.worst_channel > EXPLAINED_ERROR
     return not fixed and more and time_left()
@@ -175,8 +182,9 @@ def _again(progress: Progress) -> Step:
 def _exchange_first(
     context: SearchContext, found: Explanation, compare: Callable[[], tuple[Explanation, tuple[FittedCandidate, ...]]]
 ) -> Explanation | None:
-    """The explanation with its first effect replaced by what fits better beside the others; None where nothing does.
-    compare: the explanation without it, and the candidates in its place, the preferred one first."""
+    """The explanation with its first effect replaced by a candidate that fits better with the other effects, which is
+    then last in the order; None where there is none. compare: returns the explanation without the first effect, and the
+    candidates in its place, the preferred one first."""
 
     def find() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
         try:
@@ -191,6 +199,6 @@ def _exchange_first(
     named = tuple(candidate for candidate in tried if candidate.newest not in context.barred)
     if not named or named[0] is not tried[0] or not is_worthwhile(found.steps[-1], named[0]):
         return None
-    # What was compared with the former first effect are no rivals of the one that is first now.
+    # Rivals of the former first effect are not those of the effect that is first now.
     rounds = (kept.rounds[0][:1], *kept.rounds[1 : len(kept.steps)], named)
     return replace(kept, after=context.with_test_score(named[0]), rounds=rounds, steps=(*kept.steps, named[0]))

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.evaluation.blind_test.confidence_intervals import RESAMPLED, wilson
 from analysis.evaluation.blind_test.outcome import Outcome
-from analysis.evaluation.blind_test.share import RESAMPLED, wilson
 from equalizer.signals.signal import FloatArray
 
 BINS = 10

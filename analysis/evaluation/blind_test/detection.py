@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.evaluation.blind_test.confidence_intervals import wilson
 from analysis.evaluation.blind_test.outcome import DETECTABLE, Outcome
-from analysis.evaluation.blind_test.share import wilson
 
 PARTS = 10
 """Bins of the detection curve, with equally many cases each. By hand."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analysis.evaluation.blind_test.share import Figure, share
+from analysis.evaluation.blind_test.confidence_intervals import Figure, share
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from analysis.evaluation.blind_test.share import Figure, share
+from analysis.evaluation.blind_test.confidence_intervals import Figure, share
 
 DETECTABLE = 1.25
 """Factor by which a fault must change the held-out error of the device's base model, up or down, to count as

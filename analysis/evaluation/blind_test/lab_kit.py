@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.document import Diagnosis
-from analysis.evaluation.blind_test.share import Figure, share
+from analysis.evaluation.blind_test.confidence_intervals import Figure, share
 
 NOTHING, MISSING = "nothing", "missing"
 """Name of the change that changes nothing (control); verdict of a recording without a diagnosis."""

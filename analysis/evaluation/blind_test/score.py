@@ -8,9 +8,9 @@ import numpy as np
 
 from analysis.diagnosis.document import NamedEffect
 from analysis.evaluation.blind_test.calibration import Calibration, calibration
+from analysis.evaluation.blind_test.confidence_intervals import Figure, pool_share, share, statistic
 from analysis.evaluation.blind_test.follow_up import FollowUp, follow_up_figures
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
-from analysis.evaluation.blind_test.share import Figure, pool_share, share, statistic
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 TURN = 2 * math.pi

@@ -1,11 +1,12 @@
-"""Figures and misses of a proof as sentences."""
+"""Words for the results of a blind test: a share with its interval, what was concealed, what was answered."""
 
+from analysis.evaluation.blind_test.confidence_intervals import Figure
 from analysis.evaluation.blind_test.outcome import Outcome
-from analysis.evaluation.blind_test.share import Figure
 
 
 def figure_text(figure: Figure) -> str:
-    """A figure with its 95 % interval, in per cent where it is a share; "none drawn" where it has no value."""
+    """A figure with its 95 % interval and its number of cases, in per cent where it is a share, such as
+    "95.7 % [90, 98], 110 of 115"; "none drawn" where it has no value."""
     if figure.value is None or figure.low is None or figure.high is None:
         return "none drawn"
     if figure.hits is None:
@@ -15,16 +16,20 @@ def figure_text(figure: Figure) -> str:
 
 
 def describe_concealed(outcome: Outcome) -> str:
-    """The concealed effects with their axes; "nothing" where there are none."""
-    return " + ".join(f"{c.effect}{f' of {c.axis}' if c.axis else ''}" for c in outcome.concealed) or "nothing"
+    """The concealed effects with their axes, such as "coulomb_friction of x + end_stop of y"; "nothing" where there are
+    none."""
+    return (
+        " + ".join(f"{each.effect}{f' of {each.axis}' if each.axis else ''}" for each in outcome.concealed) or "nothing"
+    )
 
 
 def answer_text(outcome: Outcome) -> str:
-    """The verdict, and the named effects with their axes and stated probabilities."""
+    """The verdict, and the named effects with their axes and stated probabilities (0 to 1)."""
     text = " + ".join(f"{e.effect}{f' of {e.axis}' if e.axis else ''} ({e.probability:.2f})" for e in outcome.named)
     return f"{outcome.verdict.replace('_', ' ')}{f': {text}' if text else ''}"
 
 
 def strength_text(outcome: Outcome) -> str:
-    """The strengths of the concealed effects, from 0 (the weakest that is drawn) to 1, with commas between."""
+    """The strengths of the concealed effects, from 0 (the weakest that is drawn) to 1 (the strongest), separated by
+    commas; empty where nothing was concealed."""
     return ", ".join(f"{value:.2f}" for value in outcome.strengths)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.evaluation.blind_test.share import Figure, share, statistic
+from analysis.evaluation.blind_test.confidence_intervals import Figure, share, statistic
 from analysis.evaluation.laws.law_outcome import LawOutcome
 
 

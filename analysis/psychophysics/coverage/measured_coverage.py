@@ -1,4 +1,13 @@
-"""Counted by `make coverage` (tests/references/coverage_of_analyses.py), not written by hand."""
+"""Measured coverage near the force cap: how many intervals of a study report hold the true value.
+
+Reports print these counts beside each interval (`coverage_words`). Each row: analysis (`coverage_words.NAMES`),
+frequency (Hz; 0 where all frequencies are judged together), mean error (dB; None where the analysis gives no size in
+dB), intervals of 95 % that held the truth (one-way: studies in which a difference was found that was not there), and
+all intervals.
+
+Counted in simulated studies of ten people with known thresholds under the published staircase and cap, and written by
+`make coverage` (tests/references/coverage_of_analyses.py), never by hand; docs/statistics.md has the same table.
+"""
 
 from analysis.psychophysics.coverage.coverage_words import MeasuredCoverage
 

@@ -52,7 +52,8 @@ class CueAbility:
 
     @property
     def noticeable(self) -> bool:
-        """Whether it is shown that a usual judge notices: by the end of the interval that is nearer to none."""
+        """Whether the end of the interval that is nearer to 0 reaches d' = 1 at an internal noise of
+        `USUAL_NOISE_DB`."""
         if self.lower_db <= 0.0 <= self.upper_db:
             return False
         nearest_db = min(abs(self.lower_db), abs(self.upper_db))

@@ -39,7 +39,8 @@ class CueFinding:
     observed_d_prime: float | None
     """Mean d' of the answers at this frequency; includes the cue, if it was used."""
     noticed_by: tuple[str, ...]
-    """Participants for whom it is shown that a usual judge would notice the difference."""
+    """Participants whose stimuli are shown to differ so much that an internal noise of `USUAL_NOISE_DB` gives d' of
+    1."""
     answers: AnswersOnDelivery
     p_holm: float | None
     """p-value of `answers`, corrected for all cues and frequencies (Holm); None where they could not be tested."""
@@ -111,7 +112,8 @@ def cue_warnings(found: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tu
     if noticed:
         sentences.append(
             f"The two directions differed in more than their direction, by what a participant with an internal "
-            f"noise of {USUAL_NOISE_DB:g} dB notices: {conjoin(noticed)}. Those directions can be told unfelt."
+            f"noise of {USUAL_NOISE_DB:g} dB notices: {conjoin(noticed)}. So those answers need not be "
+            "about the direction."
         )
     if followed:
         sentences.append(

@@ -1,4 +1,15 @@
-"""An oscillator attached to a model (mass, spring, damper), and its estimation from the missing force's spectrum."""
+"""An oscillator (mass on spring and damper) attached to a model, and its estimation from the missing force.
+
+An oscillator of mass m, natural frequency f0 and damping ratio z on a host with the acceleration a exerts on it
+
+    F = -m a (1 + 2j z r) / (1 + 2j z r - r²),        r = f / f0
+
+The missing force is what must be added at the driven axes so that the re-tuned model moves as measured. Per trial
+(f0, z) the mass follows by weighted least squares from the missing force F and the acceleration a, together with
+corrections of the model's own mass, damping and stiffness, since F = dM a + dB a / (2j pi f) + dK a / (2j pi f)² may be
+mere mistuning. Trials are ranked by the share of the missing force that they explain beyond those corrections. The
+estimates only start a fit of the whole model.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,19 +21,23 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import cross_density, spectral_density
 
-WINDOW_S, DRIVEN, CHANCE = 2.0, 1e-4, 0.02
-"""Window of a spectrum in seconds; least power of a line, relative to the largest; share of the missing force that the
-best of all trials explains by chance."""
-
-SPANNED = 1e-9
-"""Relative singular value below which directions are linearly dependent (rounding)."""
+WINDOW_S = 2.0
+"""Window of the spectra (s): lines 0.5 Hz apart."""
+DRIVEN = 1e-4
+"""Least power of a line that is used, relative to the largest. By hand."""
+CHANCE = 0.02
+"""Share of the missing force's power that the best of all trials explains by chance. By hand."""
+DEPENDENT = 1e-9
+"""Relative singular value, or norm, below which vectors count as linearly dependent (rounding)."""
 
 
 def with_oscillator(
     model: MechanicalModel, along: FloatArray, mass: float, damping: float, stiffness: float
 ) -> MechanicalModel:
-    """The model with an oscillator as its last coordinate; unchanged for mass 0. along: (n,), the direction in the
-    coordinates to which it is tied."""
+    """The model with an oscillator as its last coordinate; unchanged for mass 0 or below.
+
+    along: (n,), direction in the model's coordinates along which it is attached. mass, damping, stiffness: SI.
+    """
     if mass <= 0:
         return model
     tie = np.append(-along, 1.0)
@@ -39,19 +54,20 @@ def with_oscillator(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MissingMass:
-    """Spectra of the missing force against an axis's acceleration; (lines,)."""
+class MissingForceSpectra:
+    """Spectra of an axis's acceleration a and of the missing force F at all m driven axes."""
 
     frequency_hz: FloatArray
+    """(lines,)"""
     power: FloatArray
-    """Power spectrum of the acceleration."""
+    """(lines,): power spectral density of the acceleration."""
     cross: ComplexArray
-    """(lines, m): cross-spectra of the acceleration with the missing force at each axis."""
+    """(lines, m): cross spectral densities conj(a) F with the missing force at each axis."""
 
 
-def estimate_missing_mass(evidence: Evidence, axis: int) -> MissingMass:
-    """Welch spectra of an axis's acceleration and of the missing force at all axes, at the lines below 0.45 of the
-    sample rate where the acceleration has more than DRIVEN of its largest power."""
+def missing_force_spectra(evidence: Evidence, axis: int) -> MissingForceSpectra:
+    """Welch spectra of the acceleration of an axis and of the missing force at all axes, at the lines below 0.45 of the
+    sample rate where the acceleration has more than `DRIVEN` of its largest power."""
     rate, used = evidence.sample_rate_hz, evidence.used[:, None]
     acceleration = np.gradient(evidence.axis_velocity, 1 / rate, axis=0) * used
     window = min(int(WINDOW_S * rate), len(used))
@@ -59,15 +75,15 @@ def estimate_missing_mass(evidence: Evidence, axis: int) -> MissingMass:
     frequency, power = spectral_density(own, rate, window)
     cross = np.array([cross_density(own, row, rate, window)[1] for row in force]).T
     inside = (frequency > 0) & (frequency < 0.45 * rate) & (power > DRIVEN * power.max())
-    return MissingMass(frequency[inside], power[inside], cross[inside])
+    return MissingForceSpectra(frequency[inside], power[inside], cross[inside])
 
 
 def oscillator_reaction(frequency_hz: FloatArray, natural_hz: float | FloatArray, damping_ratio: float) -> ComplexArray:
-    """Reaction force of an oscillator on its host per unit mass and host acceleration (negative); the arguments are
-    broadcast."""
+    """Force of an oscillator on its host per unit of its mass and of the host's acceleration, F / (m a) in the equation
+    above; the arguments are broadcast."""
     ratio = frequency_hz / natural_hz
-    tied = 1 + 2j * damping_ratio * ratio
-    return np.asarray(-tied / (tied - ratio**2))
+    spring_and_damper = 1 + 2j * damping_ratio * ratio
+    return np.asarray(-spring_and_damper / (spring_and_damper - ratio**2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +93,9 @@ class AttachedOscillator:
     natural_hz: float
     damping_ratio: float
     mass: float
+    """kg; kg m² on a rotational axis."""
     explained: float
+    """Share, 0 to 1, of the missing force's power on its axis that it explains beyond the model's linear parameters."""
     by_axis: FloatArray
     """(m,): its force on each axis relative to that on its own axis."""
 
@@ -85,25 +103,27 @@ class AttachedOscillator:
 def _orthonormal_basis(columns: FloatArray) -> FloatArray:
     """Orthonormal basis of the columns' span."""
     directions, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
-    return np.asarray(directions[:, sizes > SPANNED * sizes[0]])
+    return np.asarray(directions[:, sizes > DEPENDENT * sizes[0]])
 
 
 def likely_oscillators(
-    missing: MissingMass, axis: int, natural_hz: Sequence[float], damping_ratios: Sequence[float]
+    missing: MissingForceSpectra, axis: int, natural_hz: Sequence[float], damping_ratios: Sequence[float]
 ) -> list[AttachedOscillator]:
-    """Oscillators of all damping ratios and natural frequencies, likeliest first: those with positive mass that explain
-    more than chance, below the highest driven frequency. axis: index of the axis they are tied to."""
+    """An oscillator for each pair of a damping ratio and a natural frequency (Hz), the one that explains most first.
+
+    Left out are those of negative mass, those that explain no more than `CHANCE`, and natural frequencies above the
+    highest line. axis: index of the axis to which they are attached.
+    """
     if not len(missing.frequency_hz):
         return []
     root = np.sqrt(np.maximum(missing.power, np.finfo(float).tiny))
-    wave = 2j * np.pi * missing.frequency_hz
-    linear = np.stack([np.ones_like(wave), 1 / wave, 1 / wave**2], axis=1) * root[:, None]
+    omega = 2j * np.pi * missing.frequency_hz
+    linear = np.stack([np.ones_like(omega), 1 / omega, 1 / omega**2], axis=1) * root[:, None]
     force = missing.cross / root[:, None]
-    aim = np.vstack([force.real, force.imag])
-    linear = np.vstack([linear.real, linear.imag])
-    beside = _orthonormal_basis(linear)
-    alone = aim - beside @ (beside.T @ aim)
-    power = max(float(alone[:, axis] @ alone[:, axis]), np.finfo(float).tiny)
+    target = np.vstack([force.real, force.imag])
+    basis = _orthonormal_basis(np.vstack([linear.real, linear.imag]))
+    unexplained = target - basis @ (basis.T @ target)
+    power = max(float(unexplained[:, axis] @ unexplained[:, axis]), np.finfo(float).tiny)
     natural = np.array([item for item in natural_hz if item < missing.frequency_hz[-1]])
     found = []
     for ratio in damping_ratios:
@@ -111,11 +131,13 @@ def likely_oscillators(
         shapes = np.vstack([shape.real, shape.imag])
         # Orthogonal to what the linear parameters explain: the least-squares fit of a shape is then independent of
         # them.
-        own = shapes - beside @ (beside.T @ shapes)
+        own = shapes - basis @ (basis.T @ shapes)
         size = np.einsum("lt,lt->t", own, own)
-        apart = size > SPANNED**2 * np.einsum("lt,lt->t", shapes, shapes)
-        reactions = own[:, apart].T @ alone
-        for each, reaction, square in zip(natural[apart].tolist(), reactions, size[apart].tolist(), strict=True):
+        independent = size > DEPENDENT**2 * np.einsum("lt,lt->t", shapes, shapes)
+        reactions = own[:, independent].T @ unexplained
+        for each, reaction, square in zip(
+            natural[independent].tolist(), reactions, size[independent].tolist(), strict=True
+        ):
             if reaction[axis] > 0:
                 explained = float(reaction[axis]) ** 2 / square / power
                 by_axis = reaction / reaction[axis]
@@ -123,8 +145,8 @@ def likely_oscillators(
     return sorted((item for item in found if item.explained > CHANCE), key=lambda item: -item.explained)
 
 
-def subtract_oscillator(missing: MissingMass, each: AttachedOscillator) -> MissingMass:
-    """The missing force less that of an oscillator."""
+def subtract_oscillator(missing: MissingForceSpectra, each: AttachedOscillator) -> MissingForceSpectra:
+    """The spectra with the force of an oscillator subtracted from the missing force."""
     relative = oscillator_reaction(missing.frequency_hz, each.natural_hz, each.damping_ratio)
     reaction = missing.power * each.mass * relative
-    return MissingMass(missing.frequency_hz, missing.power, missing.cross - reaction[:, None] * each.by_axis)
+    return MissingForceSpectra(missing.frequency_hz, missing.power, missing.cross - reaction[:, None] * each.by_axis)

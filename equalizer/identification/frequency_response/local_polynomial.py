@@ -1,7 +1,14 @@
-"""Smoothing of a measured frequency response by local polynomials (after the local polynomial method of Pintelon and
-Schoukens, here on the response itself): a parabola is fitted to the neighbours of each line.
+"""Smoothing of a measured frequency response by local polynomials.
 
-Bias stays below the noise while the neighbourhood is narrower than about a resonance's half width.
+Around each line k a polynomial of low order in the frequency (default: a parabola) is fitted to the response on the
+neighbouring lines by least squares, each weighted with 1 / its standard deviation; its value at line k is the smoothed
+response. As the fit is linear in the values, it is a weighted sum over the neighbours, with weights that depend on the
+lines and their noise only:  G_smooth(k) = sum over l of W(k, l) G(l).
+
+The bias stays below the noise while the neighbourhood is narrower than about the half width of a resonance.
+
+The idea is that of the local polynomial method (Pintelon and Schoukens, System Identification, 2nd ed., 2012, chapter
+7), which fits input and output spectra with their transients; here the estimated response itself is fitted.
 """
 
 from dataclasses import dataclass, replace
@@ -16,23 +23,27 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalPolynomial:
-    """Smoothing weights of each line's neighbours: fixed by the lines and their noise, linear in the values."""
+    """Smoothing weights of the neighbours of each line (W in the equation above)."""
 
     window: npt.NDArray[np.int64]
-    """(lines, taken): indices of the neighbours of each line."""
-    rows: FloatArray
-    """(lines, taken): weights of the neighbours."""
+    """(lines, taken): indices of the neighbours of each line, itself included."""
+    weights: FloatArray
+    """(lines, taken): weights of the neighbours; real, of sum 1."""
     order: int
+    """Order of the polynomial."""
 
     @classmethod
     def over(cls, response: FrequencyResponse, neighbours: int, order: int) -> Self:
-        """Weights for a response's lines. Raises ValueError where there are fewer lines than a polynomial takes."""
+        """Weights for the lines of a response. neighbours: lines on either side. Raises ValueError where a polynomial
+        of this order needs more lines than `neighbours` gives, or there are fewer lines than it takes."""
         taken, lines = 2 * neighbours + 1, len(response)
-        if order < 0 or taken < order + 2:
-            raise ValueError(f"a polynomial of order {order} needs more than {taken} lines; let neighbours be larger")
+        if order < 0:
+            raise ValueError(f"order is {order}; a polynomial has order 0 or above")
+        if taken < order + 2:
+            raise ValueError(f"a polynomial of order {order} needs more than {taken} lines; increase neighbours")
         if lines < taken:
             raise ValueError(
-                f"smoothing takes {taken} lines at a time, but there are {lines}; widen the band, or lower the degree"
+                f"smoothing takes {taken} lines at a time, but there are {lines}; widen the band, or reduce neighbours"
             )
         window = np.clip(np.arange(lines) - neighbours, 0, lines - taken)[:, None] + np.arange(taken)
         weight = _weights(response)[window]
@@ -41,26 +52,28 @@ class LocalPolynomial:
         return cls(window, fitted, order)
 
     def apply(self, values: ComplexArray) -> ComplexArray:
-        """Smoothed values (lines, ...)."""
-        smooth: ComplexArray = np.einsum("lk,lk...->l...", self.rows, values[self.window])
+        """(lines, ...): the smoothed values; from values of the same shape."""
+        smooth: ComplexArray = np.einsum("lk,lk...->l...", self.weights, values[self.window])
         return smooth
 
     def power(self, powers: FloatArray) -> FloatArray:
-        """Variance after smoothing of independent errors with variances `powers` (lines, ...)."""
-        smooth: FloatArray = np.einsum("lk,lk...->l...", self.rows**2, powers[self.window])
+        """(lines, ...): variance after smoothing of errors that are independent between lines and have the variances
+        `powers` (lines, ...)."""
+        smooth: FloatArray = np.einsum("lk,lk...->l...", self.weights**2, powers[self.window])
         return smooth
 
 
 def smooth_response(
     response: FrequencyResponse, neighbours: int = 8, order: int = 2, about: ComplexArray | None = None
 ) -> FrequencyResponse:
-    """Smooth each line over itself and `neighbours` lines on either side; near the ends over as many, one-sided.
+    """Smooth each line over itself and `neighbours` lines on either side; near the ends of the band over as many lines,
+    but more of them on one side.
 
     about: (lines, outputs, inputs), response of an approximate model: only the difference from it is smoothed, so that
     a resonance narrower than the neighbourhood is not blunted.
 
-    The new noise variance follows from the old one, or from the scatter about the polynomials where that is larger, so
-    that lack of fit of the parabolas is included. Errors of lines next to each other are no longer independent. Raises
+    The new noise variance follows from the old one, or, where that is larger, from the scatter of the lines about the
+    polynomial, so that lack of fit is included. Errors of adjacent lines are then no longer independent. Raises
     ValueError where there are fewer lines than a polynomial takes.
     """
     local = LocalPolynomial.over(response, neighbours, order)
@@ -68,7 +81,7 @@ def smooth_response(
     rest = replace(response, response=np.asarray(response.response - known, dtype=np.complex128))
     smooth = np.asarray(local.apply(rest.response) + known, dtype=np.complex128)
     noise = local.power(response.noise_variance)
-    scatter = _scatter(rest, local) * np.sum(local.rows**2, axis=1)[:, None, None]
+    scatter = _scatter(rest, local) * np.sum(local.weights**2, axis=1)[:, None, None]
     remark = f"Smoothed: order {order} over {2 * neighbours + 1} lines."
     return replace(
         response, response=smooth, noise_variance=np.fmax(noise, scatter), remarks=(*response.remarks, remark)
@@ -76,7 +89,8 @@ def smooth_response(
 
 
 def _weights(response: FrequencyResponse) -> FloatArray:
-    """(lines,): relative weights by the lines' noise; equal where it is not known."""
+    """(lines,): least-squares weights, 1 / standard deviation of the noise over all outputs and inputs, at most 1; all
+    1 where the noise of a line is not known or zero."""
     power = response.noise_variance.sum(axis=(1, 2))
     if not (np.isfinite(power) & (power > 0)).all():
         return np.ones(len(response))
@@ -85,14 +99,14 @@ def _weights(response: FrequencyResponse) -> FloatArray:
 
 
 def _powers(frequency_hz: FloatArray, window: npt.NDArray[np.int64], order: int) -> FloatArray:
-    """(lines, taken, order + 1): powers of the distance from the line itself."""
+    """(lines, taken, order + 1): powers 0 to `order` of the distance from the line itself, scaled to at most 1."""
     away = frequency_hz[window] - frequency_hz[:, None]
     powers: FloatArray = (away / np.abs(away).max(axis=1, keepdims=True))[:, :, None] ** np.arange(order + 1)
     return powers
 
 
 def _scatter(response: FrequencyResponse, local: LocalPolynomial) -> FloatArray:
-    """(lines, outputs, inputs): power about an unweighted polynomial in each window, per degree of freedom."""
+    """(lines, outputs, inputs): variance about an unweighted polynomial in each window, per degree of freedom."""
     basis, _ = np.linalg.qr(_powers(response.frequency_hz, local.window, local.order))
     values = response.response[local.window]
     explained = np.abs(np.einsum("lko,lkpm->lopm", basis, values)) ** 2

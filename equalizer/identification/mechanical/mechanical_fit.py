@@ -1,5 +1,14 @@
-"""Fit of a linear mechanical model to recordings: masses, dampers and springs at the driven axes, and as many
-oscillators on them as the data support."""
+"""Fit of a linear mechanical model to recordings, in the frequency domain.
+
+M a + B v + K x = command: masses, dampers and springs at the driven axes, and as many oscillators on them (modes) as
+the data support. Steps of `fit_mechanical_model`:
+
+1. spectra of the segments to fit and to test (`mechanical_lines`), grouped by line (`mechanical_misfit`);
+2. a rigid body at the driven axes, fitted to the lowest band from several initial values (`mechanical_start`);
+3. modes are added one by one while the cross-validated error falls (`mechanical_order`); where sensors do not move as
+   the commands act, modes with free shapes at the sensors are tried (`modal_order`);
+4. the chosen structure is fitted to all lines, and simulated on the segments that were kept for the test.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +48,8 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 ELSEWHERE = 1.1
-"""Cross-validated error, in units of noise and floor, from which sensors that are not collocated are considered."""
+"""Cross-validated error, in units of noise and floor (1: all that can be explained), from which sensors that are not
+collocated with the commands are considered. By hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +58,9 @@ class StructureChoice:
 
     best: RefinedFit[Structure] | RefinedFit[ModalStructure]
     tried: tuple[OrderTried, ...]
+    """All structures that were tried, with their errors."""
     reason: str
+    """Why this one was chosen, as a sentence."""
 
 
 def choose_structure(
@@ -59,7 +71,11 @@ def choose_structure(
     on_progress: Callable[[float], None],
 ) -> StructureChoice:
     """Oscillators on the driven axes, if they explain the lines; else modes with free shapes at the sensors, if those
-    explain more. starts: fits of the driven axes alone up to the first of `stage_ends`, from several initial values."""
+    explain more.
+
+    groups: lines of the segments to fit. starts: fits of the driven axes alone up to the first of `stage_ends`, from
+    several initial values. on_progress: takes the share done, 0 to 1.
+    """
     best = choose_simplest(starts)
     if settings.joint:
         return StructureChoice(*grow_across_joint(groups, best, band_hz, settings, on_progress))
@@ -81,6 +97,8 @@ def _fit_sensors_elsewhere(
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
 ) -> StructureChoice:
+    """A structure in which sensors need not move as the commands act: modes with free shapes, or, where a group holds a
+    transient, which `choose_modes` does not take, oscillators whose motion the axes' own sensors share."""
     if not any(group.transient for group in groups):
         return StructureChoice(*choose_modes(groups, best.structure, band_hz, settings, on_progress))
     structure = replace(best.structure, shared=True)
@@ -88,12 +106,14 @@ def _fit_sensors_elsewhere(
     return StructureChoice(*grow_by_stages(groups, begun, band_hz, settings, on_progress))
 
 
-LINES_TO_CHOOSE_BY, IN_ALL = 400, 1600
-"""Most lines of each group, and of all groups together, in the search; the chosen structure is then fitted to all
-lines."""
+LINES_PER_GROUP, LINES_IN_ALL = 400, 1600
+"""Most lines of each group, and of all groups together, while the structure is searched, to limit time; the chosen one
+is then fitted to all lines."""
+_LEAST_LINES = 8
+"""Fewest driven lines from which a model is fitted, per axis where a part of the band is used."""
 _LOW_PARTS = (0.25, 0.5, 1.0)
-"""Shares of the first stage's band (in octaves, from its lower end) to which the rigid body is fitted: modes above
-would bias it."""
+"""Parts of the first stage's band, from its lower end and as shares of its octaves, to which the rigid body is fitted:
+a mode at higher frequencies would bias it."""
 
 
 def fit_mechanical_model(
@@ -102,17 +122,18 @@ def fit_mechanical_model(
     on_progress: Callable[[float], None] = lambda share: None,
     name: str = "fitted to recordings",
 ) -> MechanicalFit:
-    """Fit a model from the total command to the response. Response i must be the motion where and along which command i
-    acts; further responses may lie anywhere. `on_progress` takes the share done, 0 to 1.
+    """Fit a model from the total command to the response.
 
-    Raises MechanicalFitRefused where the recordings do not carry a model.
+    Response i must be the motion where and along which command i acts; further responses may lie anywhere. on_progress:
+    takes the share done, 0 to 1. name: of the model. Raises MechanicalFitRefused where the recordings do not determine
+    a model: unsuitable channels, too few driven lines, only noise, or an unstable fit.
     """
     settings = settings or MechanicalFitSettings()
     refuse_unsuitable(recordings)
     fit, test = split_fit_and_test(recordings)
     lines = [spectra for each in fit if (spectra := segment_lines(*each)) is not None]
     segments = select_band(lines, settings.band_hz)
-    if sum(len(segment.frequency_hz) for segment in segments) < 8:
+    if sum(len(segment.frequency_hz) for segment in segments) < _LEAST_LINES:
         raise MechanicalFitRefused(
             "the commands drive fewer than eight lines in the band: they are constant, or the recording is too short; "
             "record a sweep, noise or a multisine along every axis"
@@ -120,7 +141,7 @@ def fit_mechanical_model(
     band = _find_covered_band(segments)
     groups = line_groups(segments, settings.floor)
     structure = _rigid_structure(recordings[0], settings, band)
-    fewer = [group.thin_out(min(LINES_TO_CHOOSE_BY, -(-IN_ALL // len(groups)))) for group in groups]
+    fewer = [group.thin_out(min(LINES_PER_GROUP, -(-LINES_IN_ALL // len(groups)))) for group in groups]
     starts = _fit_rigid_starts(segments, fewer, structure, band, settings)
     chosen = choose_structure(fewer, starts, band, settings, on_progress)
     every = [group.of_lines(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
@@ -173,13 +194,16 @@ def _fit_rigid_starts(
     band: tuple[float, float],
     settings: MechanicalFitSettings,
 ) -> list[RefinedFit[Structure]]:
+    """Fits of a rigid body at the driven axes up to the end of the first stage, one for each initial value: from
+    growing parts of that band, without and, if asked for, with a delay."""
     found: list[RefinedFit[Structure]] = []
     first = stage_ends(band)[0]
     lower = [part for group in groups if len((part := group.of_lines(group.frequency_hz <= first)).frequency_hz)]
     for share in _LOW_PARTS:
         end = band[0] * (first / band[0]) ** share
         low = select_band(segments, (band[0], end))
-        if sum(len(each.frequency_hz) for each in low) < 8 * structure.inputs and (found or share != _LOW_PARTS[-1]):
+        lines = sum(len(each.frequency_hz) for each in low)
+        if lines < _LEAST_LINES * structure.inputs and (found or share != _LOW_PARTS[-1]):
             continue
         for delayed in (False, True)[: 1 + settings.fit_delay]:
             begun, unknowns = rigid_start(low, replace(structure, delayed=delayed), settings.floor)
@@ -188,6 +212,7 @@ def _fit_rigid_starts(
 
 
 def _rigid_structure(recording: Recording, settings: MechanicalFitSettings, band: tuple[float, float]) -> Structure:
+    """Structure without modes; its speed scale (rad/s) is the geometric middle of the band."""
     inputs, outputs = len(recording.command.channels), len(recording.response.channels)
     return Structure(
         inputs=inputs,
@@ -204,6 +229,7 @@ def _rigid_structure(recording: Recording, settings: MechanicalFitSettings, band
 
 
 def _find_covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
+    """Lowest and highest line (Hz) of all segments."""
     return (
         float(min(segment.frequency_hz[0] for segment in segments)),
         float(max(segment.frequency_hz[-1] for segment in segments)),
@@ -213,27 +239,30 @@ def _find_covered_band(segments: Sequence[SegmentLines]) -> tuple[float, float]:
 def _refit(
     groups: Sequence[LineGroup], best: RefinedFit[Structure] | RefinedFit[ModalStructure], band: tuple[float, float]
 ) -> RefinedFit[Structure] | RefinedFit[ModalStructure]:
+    """The chosen structure fitted to all lines, from the parameters of the search."""
     if isinstance(best.structure, ModalStructure):
         return balance_fit(refine_unknowns(groups, best.structure, best.unknowns, band, most_steps=6))
     return refine_unknowns(groups, best.structure, best.unknowns, band)
 
 
 def _include_all_lines(groups: Sequence[LineGroup]) -> list[LineGroup]:
+    """The groups without lines that cross-validation leaves out."""
     return [replace(group, left_out=np.zeros(len(group.left_out), dtype=bool)) for group in groups]
 
 
 def _remarks(
     final: RefinedFit[Structure] | RefinedFit[ModalStructure], channels: tuple[str, ...], tested: bool
 ) -> tuple[str, ...]:
+    """Sentences on what was assumed and what the fit shows."""
     structure = final.structure
-    own = ", ".join(channels[: structure.inputs])
-    found = [f"The model is linear and was fitted, as none was given; {own} taken to move as the commands act."]
+    collocated = ", ".join(channels[: structure.inputs])
+    found = [f"No model was given, so a linear one was fitted; {collocated} taken to move as the commands act."]
     if isinstance(structure, ModalStructure):
-        found.append("The sensors see the modes otherwise than the commands push them: a joint or cable lies between.")
+        found.append("The sensors are not where the commands act on the modes: a joint or cable lies between.")
     elif -1.0 in structure.signs:
-        found.append("The response counts the other way than the command acts.")
+        found.append("The response is positive in the direction opposite to the command.")
     if isinstance(structure, Structure) and not structure.grounded:
-        found.append("No spring to the ground is seen: the device drifts freely under a constant command.")
+        found.append("No spring to the ground was found: the device drifts under a constant command.")
     if not tested:
-        found.append("Nothing was kept for a test: the error is that of the fitted segments.")
+        found.append("No segment was kept for a test: the error is that of the fitted segments.")
     return tuple(found)

@@ -57,7 +57,7 @@ def _refuse_samples(recordings: Sequence[Recording]) -> None:
                     f"{side} {name} holds no number, only missing values; leave it out, or import it again"
                 )
             raise MechanicalFitRefused(
-                f"{side} {name} is constant throughout, so nothing can be told from it; "
+                f"{side} {name} is constant throughout, so nothing can be inferred from it; "
                 "leave it out, or record it driven"
             )
 

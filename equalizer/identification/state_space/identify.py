@@ -154,7 +154,7 @@ def _make_starts(
     except np.linalg.LinAlgError as problem:
         order = settings.order
         raise IdentificationRefused(
-            f"order {order} asks more of the {len(lines)} lines in the band than can be told apart; "
+            f"order {order} asks more of the {len(lines)} lines in the band than can be distinguished; "
             f"choose a lower order, such as {max(order // 4 * 2, 2)}"
         ) from problem
 

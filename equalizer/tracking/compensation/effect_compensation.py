@@ -20,7 +20,7 @@ from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
 from equalizer.tracking.compensation.known_forces import LAWS, Law, deadband_share, equivalent_impedance
-from equalizer.tracking.compensation.law_forces import (
+from equalizer.tracking.compensation.law_compensation import (
     compute_compensating_force,
     invert_command_map,
     linear_share,

@@ -6,7 +6,7 @@ from equalizer.effects.discovered_law import axis_names
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.tracking.compensation.known_forces import LAWS
-from equalizer.tracking.compensation.law_forces import reason_law_not_compensated
+from equalizer.tracking.compensation.law_compensation import reason_law_not_compensated
 
 IN_MODEL = "it is linear, so the identified model has it; compensating it again would count it twice"
 
@@ -28,7 +28,7 @@ LEFT_ALONE = {
     "force_nonlinearity": "the identified model has the gain at the level that it was identified at",
     "slew_limit": "there is no faster force than that",
 }
-SENSORS = "it is the sensor's: a force against it would make the handle do what the sensor gets wrong"
+SENSORS = "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
 SCALED = "in the identified model as far as it is linear; used to scale what is added"
 TIMED = "in the identified model; used to send what is added ahead of time"
 

@@ -37,7 +37,7 @@ class Verdict(Enum):
     """Decision after each measurement: to continue, or the reason to stop. The value states it in words."""
 
     CONTINUE = "play the forces and measure"
-    AT_FLOOR = "what is left cannot be told from the measured noise"
+    AT_FLOOR = "what is left cannot be distinguished from the measured noise"
     DIVERGING = "each correction made it worse; the best forces so far are kept"
     BEST_KEPT = "further corrections gain nothing; the best forces so far are kept"
 

@@ -24,7 +24,7 @@ AT_REST_S = 0.3
 EVERY_S = 0.002
 """Interval (s) of the zero forces sent meanwhile, shorter than the device's watchdog."""
 COMPARED_S = 0.02
-"""After that time, over so long the velocity is told from the positions (s): as the library does it."""
+"""After that time, over so long the velocity is computed from the positions (s): as the library does it."""
 DRIFTING_MPS = 0.02
 """After `AT_REST_S` with gravity compensated and no hand: 7 % of g in excess of friction. Below, friction holds it."""
 

@@ -1,6 +1,7 @@
-"""Devices of the vendor on the USB, and whether this account may open them, as Linux reports it.
+"""Force Dimension devices on the USB, and whether this account may open them, read from Linux (/sys/bus/usb).
 
-A device that may not be opened looks to the vendor's library as if it were not there.
+The vendor's library cannot see a device that it may not open, as if it were not plugged in; this tells the two cases
+from one another, for the message of the device check.
 """
 
 import os
@@ -8,31 +9,32 @@ from dataclasses import dataclass
 from pathlib import Path
 
 VENDOR = "1451"
-"""Force Dimension's USB vendor number, hexadecimal."""
-
+"""USB vendor number of Force Dimension, hexadecimal."""
 RULE_FILE = "/etc/udev/rules.d/51-forcedimension.rules"
-"""Rules of Linux on who may open a device of the vendor on the USB."""
+"""File for the udev rule below, which sets who may open a device of this vendor."""
 RULE = f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{VENDOR}", MODE="0660", TAG+="uaccess"'
-"""Lets the person who sits at the computer open the device."""
-
+"""udev rule: the user who is logged in at this computer may open the device (tag uaccess)."""
 ADVICE = (
-    f"Write the line {RULE} into {RULE_FILE} as administrator, run `sudo udevadm control --reload`, then plug the "
-    "device out and in."
+    f"Write the line {RULE} into {RULE_FILE} as administrator, run `sudo udevadm control --reload`, then unplug "
+    "the device and plug it in again."
 )
 
 
 @dataclass(frozen=True, slots=True)
 class UsbDevice:
-    """A device of the vendor on the USB; may_open: whether this account may read and write it."""
+    """A Force Dimension device on the USB."""
 
     product: str
+    """Product name that the device reports; "unnamed" where it reports none."""
     may_open: bool
+    """Whether this account may read and write it."""
 
 
 def find_usb_devices(
     devices: Path = Path("/sys/bus/usb/devices"), nodes: Path = Path("/dev/bus/usb")
 ) -> tuple[UsbDevice, ...] | None:
-    """Find devices on the USB; None where this system cannot list them (no Linux)."""
+    """Force Dimension devices that are plugged in; None where this system cannot list them (not Linux). devices: folder
+    with a folder per USB device. nodes: folder of the device files, by bus and number."""
     if not devices.is_dir():
         return None
     found = []
@@ -46,6 +48,7 @@ def find_usb_devices(
 
 
 def _read(path: Path) -> str:
+    """Text of a file without white space around it; empty where it cannot be read."""
     try:
         return path.read_text("utf-8", "replace").strip()
     except OSError:

@@ -1,5 +1,10 @@
-"""Spring and damper: the share of the force that follows the handle. Confined by itself, so that a reading that is
-wrong in a way that nothing can tell pulls with no more than that."""
+"""Centring spring and damper: the part of the force that depends on the measured position of the handle.
+
+    F = -K (x - centre) - B v,        v: low-pass filtered velocity
+
+Spring, damper and their sum are each limited to FEEDBACK_CAP, apart from the caps of the stimulus: a wrong reading that
+no plausibility check can detect then exerts at most this force.
+"""
 
 import math
 
@@ -27,7 +32,8 @@ from study.devices.governor.confine import BEYOND, kept_share, norm_of
 
 @part
 def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray) -> None:
-    """A low-pass of displacement over the time that really went by: its corner stays the same when ticks are late."""
+    """Low-pass filter of the velocity. It uses the time that actually passed since the last tick, so that its corner
+    frequency stays the same when ticks are late."""
     elapsed = state[ELAPSED]
     share = settings[VELOCITY_SHARE]
     if elapsed != 1.0:
@@ -40,19 +46,20 @@ def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray
 
 @part
 def _ease(state: FloatArray, settings: FloatArray) -> None:
-    """A pull at a position that stands still is taken back slowly: dry friction holds a hand at rest as still as an
-    encoder that is frozen. A hand then gives way, and is seen; an encoder that says nothing even so is stale. What was
-    taken back stays so until the end of the hold."""
+    """Reduce the force slowly while the position reads exactly the same.
+
+    A handle that dry friction holds at rest looks like a frozen encoder. With the force reduced, a real handle moves
+    and shows that the encoder works; an encoder whose reading still does not change is reported as stale. The reduction
+    stays until the end of the hold.
+    """
     if state[UNCHANGED] >= settings[EASE_TICKS] and state[PULL] > settings[FRICTION]:
         state[EASED] = min(1.0, state[EASED] + 1.0 / settings[EASE_TICKS])
 
 
 @part
 def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, gain: float, force: FloatArray) -> None:
-    """The spring, the damper and both together are each within FEEDBACK_CAP.
-
-    PULL is what they are before any easing.
-    """
+    """Add spring and damper to `force` (3,), N, each and their sum limited to FEEDBACK_CAP. gain: 0 to 1, the ramp at
+    the start and end of a hold. PULL (N) is their magnitude before `_ease` reduces it."""
     _track_velocity(state, settings, reading)
     cap, stiffness, damping = settings[FEEDBACK_CAP], settings[STIFFNESS], settings[DAMPING]
     x = stiffness * (reading[0] - settings[CENTRE_X])

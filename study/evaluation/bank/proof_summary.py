@@ -1,4 +1,5 @@
-"""Summary of a blind test for the terminal, misses first."""
+"""Summary of a blind test (`hapteq prove`) for the terminal and as JSON: misses and failed controls first, then the
+shares with their intervals."""
 
 import math
 from collections.abc import Iterator
@@ -10,7 +11,8 @@ from study.evaluation.bank.prove import BlindTest
 
 
 def blind_test_lines(done: BlindTest) -> Iterator[str]:
-    """Figures, misses and controls as terminal lines."""
+    """Lines for the terminal: every miss, the controls, each share with its 95 % interval, calibration, remarks,
+    seal."""
     score = done.score
     yield f"{len(score.misses)} misses in {len(done.outcomes)} cases"
     for miss in score.misses:
@@ -32,7 +34,7 @@ def blind_test_lines(done: BlindTest) -> Iterator[str]:
 
 
 def control_lines(done: BlindTest) -> Iterator[str]:
-    """Result of the controls; failed ones are listed one by one."""
+    """Number of controls that held, and each one that failed with the answers that it got."""
     if done.controls:
         yield f"{sum(each.held for each in done.controls)} of {len(done.controls)} controls held"
     for control in done.controls:
@@ -41,7 +43,8 @@ def control_lines(done: BlindTest) -> Iterator[str]:
 
 
 def remarks(done: BlindTest) -> Iterator[str]:
-    """What limits this blind test: cases left out or unanswered, or answers from several versions of the code."""
+    """Sentences on what limits this blind test: cases that were left out or have no answer, answers by several versions
+    of the code."""
     if done.left_out:
         yield (
             f"{done.left_out} cases of the second physics engine were left out: MuJoCo is not installed "
@@ -56,16 +59,17 @@ def remarks(done: BlindTest) -> Iterator[str]:
     if set(done.beside) - set(done.engines):
         yield f"Follow-ups and controls were answered by another version of the diagnosis ({', '.join(done.beside)})."
     if len(done.engines) > 1:
-        yield f"The answers come from {len(done.engines)} versions of the diagnosis: run the bank anew for a figure."
+        yield f"The answers come from {len(done.engines)} versions of the diagnosis: run the bank anew for one of them."
 
 
 def unanswered(done: BlindTest) -> int:
-    """Number of cases whose process died each time: a diagnosis that failed by itself says how long it took."""
+    """Number of cases whose process died or was killed at every attempt: they have no duration, whereas a diagnosis
+    that failed by itself has one."""
     return sum(each.diagnosis is None and math.isnan(each.seconds) for each in done.outcomes)
 
 
 def summary(done: BlindTest) -> dict[str, Any]:
-    """The summary as a JSON-serialisable mapping."""
+    """The summary as JSON values; of each share its value, 95 % interval and number of cases."""
     return {
         "folder": str(done.folder.path),
         "cases": len(done.outcomes),

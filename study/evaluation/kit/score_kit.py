@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis
+from analysis.evaluation.blind_test.confidence_intervals import Figure
 from analysis.evaluation.blind_test.lab_kit import MISSING, Label, Scored, kit_figures, score_label, score_unanswered
-from analysis.evaluation.blind_test.share import Figure
 from study.errors import StudyError, WrongUseError
 from study.evaluation.kit.lab_kit import read_labels, read_sealed_hash, seal_of
 from study.store.disk.csv_rows import rows_to_csv

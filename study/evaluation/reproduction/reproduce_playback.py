@@ -1,4 +1,9 @@
-"""Play wanted accelerations axis by axis on the simulated device and measure its true acceleration (figure 5)."""
+"""Play wanted accelerations axis by axis on the simulated device and measure its true acceleration (figure 5).
+
+Figure 5 of the paper compares wanted and delivered accelerations with and without the equalizer. Each row of the figure
+is one place, one device and one way to convert the wanted acceleration to forces (a driver). The three axes are played
+one after the other, all rows at the same peak force.
+"""
 
 import contextlib
 from collections.abc import Callable
@@ -25,16 +30,16 @@ from study.store.formats.protocol_files import read_recording_protocol
 AXES = ("ax", "ay", "az")
 """Names of the channels of a wanted acceleration."""
 PEAK_OVER_CAP = 0.93
-"""Peak force of everything that is played, as a fraction of the cap: far above friction, below the cap."""
+"""Peak of the norm of the force, as a fraction of the cap: far above friction, and not clipped."""
 PERIODS = 2
-"""Periods played; the first lets the transient decay."""
+"""Periods played; the transient decays in the first, and the last is measured."""
 FADE_S = 0.5
-"""Fade at the start of the periodic forces (s)."""
+"""Fade-in of the periodic forces (s)."""
 WAVE_SEED = 5
-"""Seed of the wanted wave, the same for all methods."""
+"""Seed of the wanted acceleration, the same for all rows, so that they can be compared."""
 
 Driver = Callable[[Signal], FloatArray]
-"""Maps one period of wanted accelerations (period, 3) to forces."""
+"""Forces (period, 3), up to a common factor, that should cause one period of wanted accelerations (period, 3), m/s²."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,17 +49,21 @@ class PlaybackRow:
     name: str
     driver: Driver
     place_m: Place = CENTRE
+    """Place of the handle in the workspace."""
     device: str = SIMULATED
+    """Name of the device, as of `--device`."""
     hand: bool = False
+    """Whether a simulated hand holds the handle."""
     signal: SignalKind = "sweep"
+    """Kind of the wanted acceleration."""
 
 
 def not_equalized(wanted: Signal) -> FloatArray:
-    """Forces proportional to the wanted acceleration."""
+    """(period, 3): forces proportional to the wanted acceleration, as without an equalizer."""
     return wanted.samples
 
 
-def play_row(plan: ReproductionPlan, playing: PlaybackRow) -> PlayedResponse:
+def play_row(plan: ReproductionPlan, row: PlaybackRow) -> PlayedResponse:
     """Play one row. Raises DeviceError, or StudyError where the device does not report its true acceleration."""
     protocol = read_recording_protocol(plan.protocols.band).protocol
     settings = DeviceSettings(
@@ -62,34 +71,36 @@ def play_row(plan: ReproductionPlan, playing: PlaybackRow) -> PlayedResponse:
         spring_frequency_hz=protocol.spring.natural_frequency_hz,
         spring_damping_n_s_per_m=protocol.spring.damping_n_s_per_m,
         keep_s=1.0,
-        hand_on_handle=playing.hand,
-        place_m=playing.place_m,
+        hand_on_handle=row.hand,
+        place_m=row.place_m,
     )
     peak_n = PEAK_OVER_CAP * protocol.safety.stimulus_cap_n
-    with contextlib.closing(open_device(playing.device, settings, VirtualClock(), plan.seed)) as device:
-        return _play_axes(plan, playing, device, peak_n)
+    with contextlib.closing(open_device(row.device, settings, VirtualClock(), plan.seed)) as device:
+        return _play_axes(plan, row, device, peak_n)
 
 
-def _play_axes(plan: ReproductionPlan, playing: PlaybackRow, device: Device, peak_n: float) -> PlayedResponse:
+def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n: float) -> PlayedResponse:
+    """The response from wanted to true acceleration, (lines, 3, 3), from one play per axis with the peak force
+    `peak_n`."""
     rate_hz = device.info.sample_rate_hz
-    wave = make_wanted_wave(playing.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
+    wave = make_wanted_wave(row.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
     wanted, delivered, clipped = [], [], 0
     for axis in range(3):
         samples = np.zeros((len(wave), 3))
         samples[:, axis] = wave
-        loop = playing.driver(Signal(samples, rate_hz, "acceleration", "m/s^2", AXES))
+        loop = row.driver(Signal(samples, rate_hz, "acceleration", "m/s^2", AXES))
         scale = peak_n / float(np.linalg.norm(loop, axis=1).max())
-        played, limited = _steady(device, scale * loop)
+        played, limited = _play_to_steady_state(device, scale * loop)
         wanted.append(scale * wave)
         delivered.append(played)
         clipped += limited
     frequency_hz, response = estimate_response(np.array(wanted), delivered, plan.band_hz, rate_hz)
     return PlayedResponse(
-        name=playing.name,
+        name=row.name,
         device=device.info.name,
-        place_m=playing.place_m,
-        hand=playing.hand,
-        signal=playing.signal,
+        place_m=row.place_m,
+        hand=row.hand,
+        signal=row.signal,
         frequency_hz=frequency_hz,
         response=response,
         peak_force_n=peak_n,
@@ -97,15 +108,15 @@ def _play_axes(plan: ReproductionPlan, playing: PlaybackRow, device: Device, pea
     )
 
 
-def _steady(device: Device, loop: FloatArray) -> tuple[FloatArray, int]:
-    """Last period of the handle's true acceleration, (period, 3), and the number of ticks at which a cap cut the
-    force."""
+def _play_to_steady_state(device: Device, loop: FloatArray) -> tuple[FloatArray, int]:
+    """The last period of the handle's true acceleration, (period, 3) in m/s², and the number of ticks at which a cap
+    cut the force. loop: (period, 3), N."""
     rate_hz = device.info.sample_rate_hz
     forces = apply_fades(np.tile(loop, (PERIODS, 1)), round(FADE_S * rate_hz), 0)
     played = device.play(Signal(forces, rate_hz, "force", "N", ("fx", "fy", "fz")))
     if played.truth is None or played.recording is None:
         raise StudyError(
-            "The device did not play it through",
+            "The device did not play the forces to their end",
             f"{device.info.name}: {played.health.fault.value}; its true acceleration is not known.",
             "Run the command again.",
             saved="Recordings and models so far are in the folder.",

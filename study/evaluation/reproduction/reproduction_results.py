@@ -1,4 +1,4 @@
-"""All results from which the five figures are made."""
+"""Results of a reproduction of the paper's five figures: what each step found, for document, figures and page."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,18 +14,25 @@ from study.evaluation.reproduction.reproduce_equalized import EqualizedPlayback
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Results:
-    """Results of all steps of a reproduction, from which document, figures and page are made."""
+    """Results of all steps of a reproduction."""
 
     study: StudyAnalysis
+    """Thresholds of simulated participants (figure 2)."""
     ellipsoids: tuple[EllipsoidResult, ...]
+    """Acceleration ellipsoids (figure 3)."""
     device: MeasuredDevice
+    """Measured frequency responses of the simulated device (figures 1 and 4)."""
     device_name: str
     played: EqualizedPlayback
+    """Playback with the equalizer (figure 5)."""
     baselines: tuple[PlayedResponse, ...]
+    """Playback by other methods, for comparison."""
     models: tuple[UsedModel, ...]
+    """Models that the equalizer used."""
     tested: HeldOut | None
-    """Held-out test of the centre's model."""
+    """Held-out test of the model identified at the centre of the workspace; None where it was not tested."""
     tested_frictionless: HeldOut | None
+    """The same for the device without friction."""
     remarks: tuple[str, ...]
     """Remarks on recordings and models, as sentences."""
     sources: tuple[Path, ...]

@@ -25,7 +25,7 @@ _OURS = "hapteq"
 _OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
 """Bytes by which a document names one of these formats."""
 _LOOKED_AT = 4096
-"""Bytes at the start of a file in which a format of ours names itself."""
+"""Bytes at the start of a file in which a hapteq format names itself."""
 _UNIT_KEYS = ("unit", "units")
 """Keys beside values that state their unit."""
 _VALUE_KEYS = ("values", "value", "data", "samples")
@@ -40,7 +40,7 @@ def read_json_arrays(path: Path) -> dict[str, Array]:
         raise ValueError(f"it is no UTF-8 text (byte {problem.start}), as JSON is; save it as UTF-8") from problem
     document = _parse(text)
     if isinstance(document, dict) and str(document.get("format", "")).startswith(_OURS):
-        raise ValueError(f"it is a document of ours ({document['format']}), and holds no recording")
+        raise ValueError(f"it is a hapteq document ({document['format']}), and holds no recording")
     found = dict(_arrays(document, ()))
     parents = {place[:-1] for place, array in found.items() if array.size > 1}
     alone = parents.pop() if len(parents) == 1 else ()

@@ -170,7 +170,7 @@ class DiagnosisMap:
 
     model: Annotated[
         str,
-        Field(description="A mechanical model beside the map, or one of ours. Default: a linear one is fitted."),
+        Field(description="A mechanical model beside the map, or a shipped one. Default: a linear one is fitted."),
     ] = ""
     tests: Annotated[
         str, Field(description="Name of the map whose model these recordings only test; they are not diagnosed.")

@@ -28,7 +28,7 @@ from study.session.facts.log_time import Moment
 from study.session.state.daily_dose import with_dose_elsewhere
 from study.session.state.draw_check import LogContradiction
 from study.session.state.fold_trial import answer_trial, measure_trial, present_trial, spoil_trial
-from study.session.state.probing import STRONGEST_WEIGHT_HZ, ProbingState, after_break, begin_probe, end_probe
+from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, after_break, begin_probe, end_probe
 from study.session.state.rules import place_comes_later
 from study.session.state.sitting_state import (
     SittingState,
@@ -99,7 +99,7 @@ def _apply_rest(state: SessionState, event: RestTaken) -> SessionState:
     return replace(rested, rest_due_s=0.0)
 
 
-def _with_probing(state: SessionState, probing: ProbingState) -> SessionState:
+def _with_probing(state: SessionState, probing: ProbeState) -> SessionState:
     return replace(state, sitting=replace(state.sitting, probing=probing))
 
 
@@ -115,7 +115,7 @@ def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> Ses
     if probing.open is None or probing.open.kind != "hand":
         return after
     amplitude_mps2 = None if event.rms_mps2 is None else math.sqrt(2) * event.rms_mps2
-    sitting = add_exposure(after.sitting, STRONGEST_WEIGHT_HZ, amplitude_mps2, event.vibrated_s)
+    sitting = add_exposure(after.sitting, LARGEST_WEIGHT_HZ, amplitude_mps2, event.vibrated_s)
     return replace(after, sitting=sitting)
 
 

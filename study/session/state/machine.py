@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from study.session.facts.log_time import Moment
 from study.session.state.due_trial import Present
-from study.session.state.probing import Probe, Reference, due_probe, due_reference
+from study.session.state.probe_state import Probe, Reference, due_probe, due_reference
 from study.session.state.sitting_state import dose_now, pass_time
 from study.session.state.state import SessionState, due
 from study.session.state.vibration_dose import a8_mps2

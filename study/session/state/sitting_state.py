@@ -8,7 +8,7 @@ from typing import Literal
 from protocols.trial import Trial
 from study.session.facts.log_time import ClockStep, Moment, clock_step, elapsed_s
 from study.session.facts.sitting_events import DemoFinished, DeviceChecked, FormFilled
-from study.session.state.probing import ProbingState
+from study.session.state.probe_state import ProbeState
 from study.session.state.vibration_dose import NO_DOSE, Dose, add, total
 
 
@@ -59,7 +59,7 @@ class SittingState:
     """The last long rest."""
     clock_steps: tuple[ClockStep, ...] = ()
     """Steps of the computer's wall clock."""
-    probing: ProbingState = ProbingState()  # noqa: RUF009 - frozen
+    probing: ProbeState = ProbeState()  # noqa: RUF009 - frozen
 
 
 NIGHT_H = 10.0

@@ -1,5 +1,7 @@
-"""The stimulus in the form that a device plays: separate from how it is computed, so that devices do not depend on
-equalizers."""
+"""The stimulus of a trial in the form that a device plays: a periodic force that is held until the answer.
+
+It is separate from `stimulus`, which computes it, so that devices do not depend on equalizers.
+"""
 
 from dataclasses import dataclass
 
@@ -10,19 +12,22 @@ from equalizer.signals.signal import FloatArray, Signal
 
 @dataclass(frozen=True, slots=True)
 class HeldStimulus:
-    """A force to be played: one loop of whole periods, repeated, with a fade at either end."""
+    """A force that a device repeats until the answer: a loop of whole periods, with a fade at either end."""
 
     loop: Signal
     """(n, 3) in N, axes x, y, z, at the device's rate."""
     fade_in_s: float
+    """Duration of the fade-in, over which the virtual spring also takes hold. Not applied to the force of a stimulus
+    with an `onset`."""
     fade_out_s: float
+    """Duration of the fade-out, which begins when the answer is in."""
     fade_shape: str
-    """"raised_cosine" or "linear"."""
+    """Shape of both fades: "raised_cosine" or "linear"."""
     onset: Signal | None = None
-    """(ticks, 3) in N: played once before the loop, for a stimulus that has an onset of its own instead of a
-    fade-in."""
+    """(ticks, 3) in N, played once before the loop: of an equalized stimulus, whose transient is computed so that the
+    acceleration rises smoothly, in place of a fade-in."""
 
     @property
     def played_once_then_loop(self) -> FloatArray:
-        """Onset and loop in sequence, (ticks + n, 3), N."""
+        """(ticks + n, 3) in N: the onset and one loop in sequence; the loop alone where there is no onset."""
         return self.loop.samples if self.onset is None else np.concatenate([self.onset.samples, self.loop.samples])

@@ -206,7 +206,7 @@ class AfterPause(Enum):
     LEAVE = "leave"
     """The session can be resumed."""
     WITHDRAW = "withdraw"
-    """The participant takes the consent back: leave, and erase after the device is closed."""
+    """The participant withdraws the consent: leave, and erase after the device is closed."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,7 +56,7 @@ def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:
     except ValueError as error:
         raise UnusableFileError(path, kind, (f"this is not JSON: {error}",)) from error
     if not isinstance(document, dict):
-        wrong = f"it holds a {type(document).__name__}; a document of ours is an object with format and version"
+        wrong = f"it holds a {type(document).__name__}; a hapteq document is an object with format and version"
         raise UnusableFileError(path, kind, (wrong,))
     return document
 

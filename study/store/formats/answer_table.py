@@ -1,4 +1,4 @@
-"""Answers to a protocol's questions as a table, a row per session, for exported data."""
+"""Table of the answers to a protocol's questionnaires, for exported data: a row per session, a column per question."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,17 +8,21 @@ from protocols.definition.study_protocol import StudyProtocol
 from study.store.disk.csv_rows import csv_line
 
 ASKED = {"before": "questionnaire", "debrief": "debrief"}
-"""Table of a protocol, and the form by which its answers are logged."""
+"""Per table of questions in a protocol ([[before]], [[debrief]]), the name of the form in the log."""
 
 
 @dataclass(frozen=True, slots=True)
 class FilledForm:
-    """A filled form, as it was logged."""
+    """A form that a participant filled in, as it was logged."""
 
     subject: str
+    """Code of the participant."""
     session: str
+    """Name of the session."""
     form: str
+    """Name of the form, as in `ASKED`."""
     answers: Mapping[str, str]
+    """Answer by the question's key."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +46,8 @@ class AnswerColumn:
 
     @property
     def levels(self) -> dict[str, str]:
-        """What a value means, where that is not the value itself; none for numbers and free text."""
+        """Meaning of each coded value; of a scale, of its two ends only. Empty for numbers and free text, and where
+        codes and choices are the same."""
         question = self.question
         if question.ends:
             return {question.steps[0]: question.ends[0], question.steps[-1]: question.ends[1]}
@@ -70,8 +75,11 @@ class AnswerTable:
 
 
 def answer_table(protocol: StudyProtocol, filled: Sequence[FilledForm], free_text: bool) -> AnswerTable:
-    """The table; without columns where nothing is asked. free_text: with what participants wrote in their own words,
-    which may be about their health or name a person."""
+    """The table of all sessions with a filled form; empty where the protocol asks nothing.
+
+    free_text: include answers in the participants' own words, which may be about their health or name a person. Where a
+    form was filled in twice, the later answer counts.
+    """
     asked = {"before": protocol.before, "debrief": protocol.debrief}
     columns = tuple(
         AnswerColumn(table, question)

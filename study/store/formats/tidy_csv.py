@@ -1,4 +1,9 @@
-"""Trials as one tidy table, a row per presentation, with a data dictionary, the protocol and the facts."""
+"""Export of a study's trials as tidy CSV: one table with a row per presentation, a data dictionary, protocol and facts.
+
+Files of the folder: `trials.csv`, `dictionary.csv` (meaning and unit of every column), `protocol.toml` (the study's own
+text), `facts.json` (study, program, hashes), and `answers.csv` where the protocol asks questions. Tidy: one variable a
+column, one observation a row (Wickham, Journal of Statistical Software 59 (2014), 10).
+"""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -16,13 +21,13 @@ from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME = "trials.csv", "dictionary.csv", "protocol.toml", "facts.json"
 ANSWERS_NAME = "answers.csv"
-"""Only where the protocol asks questions."""
+"""Answers to questionnaires; written only where the protocol asks questions."""
 KIND = "table of exported trials"
-"""What messages call such a file."""
+"""Name of the file's kind in messages."""
 
 
 def is_tidy_csv(folder: Path) -> bool:
-    """Whether the folder contains all four files of an export as CSV."""
+    """Whether the folder contains the four files that every such export has."""
     return all((folder / name).is_file() for name in (TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME))
 
 
@@ -34,7 +39,8 @@ def write_tidy_csv(
     facts: Mapping[str, Any],
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
-    """Write the table. folder: existing and empty. name: of the study. facts: JSON values. Raises CannotWriteError."""
+    """Write the export and return its files. folder: existing and empty. name: of the study. protocol_text: TOML.
+    facts: JSON values about the study and the program. Raises CannotWriteError."""
     rows = [["column", "description", "unit"], *([column, *TRIAL_COLUMNS[column]] for column in columns(Trial))]
     rows += [[column.name, column.description, column.question.unit] for column in answers.columns]
     texts = {
@@ -51,7 +57,8 @@ def write_tidy_csv(
 
 
 def read_tidy_csv(folder: Path) -> ExportedTrials:
-    """Read what `write_tidy_csv` wrote. Raises CannotReadError, UnusableFileError."""
+    """Read the trials, protocol and facts that `write_tidy_csv` wrote. Raises CannotReadError where a file cannot be
+    opened, UnusableFileError where its content is not valid."""
     path = folder / FACTS_NAME
     try:
         facts = load_json(read_text(path))

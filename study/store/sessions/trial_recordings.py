@@ -1,4 +1,8 @@
-"""Recording of each trial, beside the log: written once, named by run, trial and attempt."""
+"""The recording of each trial and of each probe, a file of its own in the session's folder.
+
+A file is written once, before the log mentions it with its hash; its name holds run, trial and attempt. So a recording
+that the log does not mention yet can be found again after a crash.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,35 +15,37 @@ from study.store.formats.recording_file import read_recording, write_recording
 from study.store.sessions.archive import SessionFolder
 
 PROBE_PREFIX = "probe-"
-"""File name prefix of recordings of a probe instead of a trial."""
+"""Start of the file name of a probe's recording."""
 
 
 @dataclass(frozen=True, slots=True)
 class SavedRecording:
-    """A recording in a session's folder, and its hash for the log."""
+    """A recording in a session's folder, as the log names it."""
 
     name: str
-    """Relative to the session folder."""
+    """Path relative to the session's folder."""
     sha256: str
+    """Hash of the file."""
 
 
 def recording_name(run: int, trial: int, attempt: int) -> str:
-    """Name of a trial's recording, relative to the session folder."""
+    """Path of a trial's recording, relative to the session's folder. run, trial, attempt: from 0."""
     return f"recordings/run-{run:02d}_trial-{trial:03d}_attempt-{attempt}.h5"
 
 
 def probe_name(number: int) -> str:
-    """Name of a probe's recording, relative to the session folder."""
+    """Path of a probe's recording, relative to the session's folder. number: of the probe in the session, from 0."""
     return f"recordings/{PROBE_PREFIX}{number:03d}.h5"
 
 
 def save_trial_recording(
     folder: SessionFolder, name: str, recording: Recording, conditions: Mapping[str, Any]
 ) -> SavedRecording:
-    """Save a trial's recording; on return it is on the disk. conditions: JSON values about what was played and the
-    device's state.
+    """Save the recording of a trial or probe; on return it is on the disk, as 32-bit floating-point numbers.
 
-    Nothing is overwritten: if a disk lost the end of a log but not its recordings, the name gets a number.
+    conditions: JSON values about what was played and the state of the device. No file is overwritten: where one of this
+    name exists, because the end of a log was lost but not the recordings, the name gets a number. Raises StudyError
+    where the file cannot be written.
     """
     name = _free_name(folder.path, name)
     path = folder.path / name
@@ -48,9 +54,9 @@ def save_trial_recording(
 
 
 def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecording, Recording] | None:
-    """A recording on the disk that the log does not mention; the latest of its name.
+    """The latest recording of this name on the disk, which the log need not mention; None where there is none.
 
-    Raises StudyError if it cannot be read.
+    Raises StudyError where it cannot be read.
     """
     stem = Path(name).stem
     of_trial = [path for path in folder.recordings.glob(f"{stem}_*.h5") if path.stem.rpartition("_")[2].isdigit()]
@@ -62,6 +68,7 @@ def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecordi
 
 
 def _free_name(folder: Path, name: str) -> str:
+    """The name, or with the lowest number from 2 on that makes it new."""
     taken = 1
     free = name
     while (folder / free).exists():

@@ -15,7 +15,7 @@ from study.tui.screens.help import HelpScreen
 HELP = """\
 # Withdrawal
 
-A participant takes the consent back. All sessions of this code in this data folder are erased for good: answers,
+A participant withdraws the consent. All sessions of this code in this data folder are erased for good: answers,
 recordings, tables and figures, and the analysis of the folder, which was made from them too. A tombstone with the
 session's name stays, so that the code is not given again.
 

@@ -1,4 +1,8 @@
-"""A watched session as lines of text: changes between two views, or one whole view."""
+"""A running session as lines of text, for `hapteq watch --plain` and for a terminal without a screen program.
+
+`changes` gives one line for each difference between two views, `status` the whole view. What a view may contain, so
+that the experimenter cannot give away an answer, is decided in `watch_view`.
+"""
 
 from study.session.watching.watch_view import ClosedTrial, WatchView
 from study.tui.watch.watch_words import (
@@ -21,13 +25,15 @@ from study.tui.watch.watch_words import (
 )
 
 BELL = "\a"
-"""Lets the terminal ring."""
+"""Character that makes a terminal ring."""
 LABEL_CELLS = 11
-"""Width of the words before each line of `status`."""
+"""Width of the label at the start of each line of `status`, in character cells; long lines are indented by it."""
 
 
 def changes(before: WatchView | None, now: WatchView) -> list[str]:
-    """One line for each change, alarms first, each with a bell. Without a previous view: the current state."""
+    """One line for each change from one view to the next: alarms first, each with a bell, then trials, notes (oldest
+    first), drifts, the staircase and the state of the session. before: None at the start: the whole view follows the
+    alarms."""
     reported = {(alarm.kind, alarm.since) for alarm in before.alarms} if before is not None else set()
     lines = [f"{BELL}ALARM {alarm.sentence}" for alarm in now.alarms if (alarm.kind, alarm.since) not in reported]
     if before is None:
@@ -45,7 +51,7 @@ def changes(before: WatchView | None, now: WatchView) -> list[str]:
 
 
 def status(view: WatchView) -> list[str]:
-    """The whole view, without what is in the log anyway."""
+    """The whole view, a labelled line for each of its parts: of the last trials and notes, three each."""
     lines = [
         f"{SYMBOLS[view.standing]} {view.standing.upper()} {view.session}: {describe_activity(view)}",
         f"Protocol   {view.protocol}; {view.answers} answers",
@@ -59,7 +65,7 @@ def status(view: WatchView) -> list[str]:
     ]
     if view.probes:
         lines.append(f"Drift      {drift_words(view)}")
-    lines += [f"Drift      {drift.sentence}{' BEYOND' if drift.beyond else ''}" for drift in view.drifts]
+    lines += [f"Drift      {drift.sentence}{' BEYOND THE LIMIT' if drift.beyond else ''}" for drift in view.drifts]
     for run in view.runs:
         lines.append(f"Run        {run_name(view, run)}, {run.frequency_hz:g} Hz: {run.status}, {run.trials} trials")
         if run.reversals_needed:
@@ -72,21 +78,25 @@ def status(view: WatchView) -> list[str]:
 
 
 def _new_trials(before: WatchView, now: WatchView) -> list[ClosedTrial]:
-    """Oldest first. A trial that is being measured is reported afterwards."""
+    """Trials that were not in the view before, oldest first. A trial that is still being measured is left to a later
+    view."""
     reported = {(t.run, t.trial, t.attempt) for t in before.last if t.status != "measuring"}
     fresh = [t for t in now.last if (t.run, t.trial, t.attempt) not in reported and t.status != "measuring"]
+    # A view holds the latest trials only: one before the newest of the previous view was reported long ago.
     newest = (before.last[0].run, before.last[0].trial, before.last[0].attempt) if before.last else (-1, 0, 0)
     return [t for t in fresh[::-1] if (t.run, t.trial, t.attempt) >= newest]
 
 
 def _trial_line(trial: ClosedTrial) -> str:
+    """A trial with its frequency, level, verdict, answer, response time and measured acceleration; numbers from 1."""
     parts = [f"trial {trial.trial + 1} at {trial.frequency_hz:g} Hz, {trial.level_n:.3g} N: {verdict(trial)}"]
     if trial.answer is not None:
         parts.append(f"shown {trial.shown}, said {trial.answer}" if trial.shown else f"said {trial.answer}")
     if trial.response_time_s is not None:
         parts.append(f"{trial.response_time_s:.1f} s")
     if trial.delivered_mps2 is not None:
-        parts.append(f"{trial.delivered_mps2:.1f} m/s², {trial.off_axis_mps2 or 0.0:.1f} across")
+        across = "" if trial.off_axis_mps2 is None else f", {trial.off_axis_mps2:.1f} across"
+        parts.append(f"{trial.delivered_mps2:.1f} m/s²{across}")
     elif not_measured(trial):
         parts.append("not measured")
     if trial.reversal:

@@ -212,7 +212,7 @@ def _check_compared(plan: DiagnosePlan, found: DiagnosisInput, model: Mechanical
     if plan.compare == "force" and plan.clean:
         happened = "Beside clean recordings errors are measured by the rule, so that both are measured alike."
     elif plan.compare == "force" and not all(has_motion(each, model) for each in found.recordings):
-        happened = "Neither positions nor velocities of every driven axis were measured, so no force can be told."
+        happened = "Neither positions nor velocities of every driven axis were measured, so no force can be computed."
     else:
         return
     raise WrongUseError(

@@ -12,7 +12,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
-from study.workflows.recording.recording_from import read_any_recording
+from study.workflows.recording.read_any_recording import read_any_recording
 
 Checked = TypeVar("Checked")
 

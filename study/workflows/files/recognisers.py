@@ -194,7 +194,7 @@ def recognise_trajectory(content: FileContent) -> str | None:
 
 def recognise_trials(content: FileContent) -> str | None:
     """A CSV table of trials, by the first two columns of its header."""
-    # A header with one wrong column is still one of ours; both tables begin with the subject.
+    # A header with one wrong column still belongs to a hapteq table; both tables begin with the subject.
     if content.header[:2] != TRIALS_HEADER[:2] and header_problem(content.header, TRIALS_HEADER):
         return None
     return f"table of {_count(len(read_trials(content.path)), 'trial')}"

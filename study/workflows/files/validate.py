@@ -89,7 +89,7 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
 
 
 def _is_foreign(path: Path) -> bool:
-    """Whether a file is of a kind in which nothing of ours is stored."""
+    """Whether a file is of a kind in which hapteq stores nothing."""
     kind = path.suffix.lower()
     try:
         return kind in FOREIGN and kind not in (*TABLES, *RECORDS) and path.is_file()
@@ -127,7 +127,7 @@ def _describe_unknown(content: FileContent) -> tuple[str, str]:
         case ".toml":
             return "TOML file", _toml_problem(content)
         case ".csv":
-            return "table", f"its header, '{','.join(content.header)}', is none of ours; {KNOWN}"
+            return "table", f"its header, '{','.join(content.header)}', is not known; {KNOWN}"
     return "unknown file", f"nothing here knows this file; {KNOWN}"
 
 
@@ -137,7 +137,7 @@ def _json_problem(content: FileContent) -> str:
     except ValueError as error:
         return f"this is not JSON: {error}"
     if content.json_format is None:
-        return "it says no format; every document of ours says its format and version"
+        return "it says no format; every hapteq document says its format and version"
     return f"its format, '{content.json_format}', is not known here"
 
 

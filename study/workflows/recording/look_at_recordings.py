@@ -13,7 +13,7 @@ from analysis.reports.look_report import pictures_of, render_look_report
 from study.local_clock import local_now
 from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
-from study.workflows.recording.recording_from import read_any_recording
+from study.workflows.recording.read_any_recording import read_any_recording
 
 PAGE_NAME = "report.html"
 """Page about the recordings, in the folder of results."""

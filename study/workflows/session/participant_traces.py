@@ -191,7 +191,7 @@ def _names(path: Path, subject: str) -> bool:
 
 
 def _text(path: Path) -> str | None:
-    """The text; None if it is not a regular file, or too large for one of ours."""
+    """The text; None if it is not a regular file, or too large for a hapteq text file."""
     try:
         return read_regular(path, LARGEST_BYTES).decode("utf-8", errors="replace") if is_real_file(path) else None
     except OSError:

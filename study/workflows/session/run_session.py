@@ -11,7 +11,7 @@ from study.session.facts.events import RestTaken, SessionClosed, SessionInterrup
 from study.session.facts.void_reasons import busy_sentence, why_too_many
 from study.session.state.due_trial import Present, labels_are_swapped
 from study.session.state.machine import Action, Demonstrate, FillIn, Finish, Leave, Rest, next_action
-from study.session.state.probing import Probe, Reference
+from study.session.state.probe_state import Probe, Reference
 from study.session.state.progress import progress
 from study.session.state.state import SessionState, felt
 from study.session.views.archive_views import TURNED_AWAY

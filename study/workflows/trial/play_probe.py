@@ -10,7 +10,7 @@ from equalizer.signals.recording import Recording
 from protocols.definition.probes import PERIOD_S
 from study.devices.device import Fault, Played
 from study.session.facts.events import ProbeMeasured, ProbePlayed
-from study.session.state.probing import Probe
+from study.session.state.probe_state import Probe
 from study.session.state.state import SessionState
 from study.session.stimulus.probe_stimulus import HELD_S, probe_stimulus, reference_commands
 from study.session.views.form_views import FormKind

@@ -84,7 +84,7 @@ def _mtime_s(path: Path) -> float:
 def _is_model(path: Path) -> bool:
     try:
         return is_identified_model(path)
-    except StudyError:  # a recording, or no file of ours
+    except StudyError:  # a recording, or not a hapteq file
         return False
 
 

@@ -54,7 +54,7 @@ def test_every_threshold_keeps_its_participants_marker_and_is_hollow_where_the_c
     analysis = analyse_study(ten, protocol)
     shown = [line for line in ten_drawn["thresholds"].figure.axes[0].lines if line.get_marker() in MARKERS]
     assert len(shown) == 50
-    # Ten participants, ten markers, five frequencies: also those that the cap cut are told apart.
+    # Ten participants, ten markers, five frequencies: also those that the cap cut are distinguished.
     assert Counter(str(line.get_marker()) for line in shown) == Counter(dict.fromkeys(MARKERS, 5))
     hollow = [line for line in shown if line.get_markerfacecolor() == "white"]
     assert len(hollow) == sum(row.censored for row in analysis.thresholds) > 0

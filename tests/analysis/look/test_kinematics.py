@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from analysis.look.agreement import Agreement
 from analysis.look.channels import channels_of
 from analysis.look.cross_spectra import cross_spectra
+from analysis.look.gain_and_lag import GainAndLag
 from analysis.look.kinematics import KinematicPair, find_kinematic_pairs, kinematic_checks, lag_checks
 from equalizer.signals.recording import Recording
 
@@ -32,7 +32,7 @@ def test_factor_sign_and_lag_of_an_acceleration_are_found(recording, motion, fac
     noise = 0.02 * acceleration.std() * np.random.default_rng(2).standard_normal(len(force))
     (pair,) = pairs_of(recording(force, factor * (delayed(acceleration, lag) + noise), position=place))
     assert (pair.place, pair.derivative, pair.order) == ("position 'x1'", "response 'a1'", 2)
-    assert pair.agreement.factor == pytest.approx(factor, rel=0.03)
+    assert pair.agreement.gain == pytest.approx(factor, rel=0.03)
     assert pair.agreement.lag_samples == pytest.approx(lag, abs=0.1)
 
 
@@ -42,7 +42,7 @@ def test_a_speed_is_compared_with_the_derivative_of_its_position(recording, moti
     (pair,) = pairs_of(recording(force, (factor * speed, "velocity", "m/s"), position=place))
     (check,) = kinematic_checks([pair], RATE_HZ)
     assert (pair.order, check.level) == (1, level)
-    assert pair.agreement.factor == pytest.approx(factor, rel=0.01)
+    assert pair.agreement.gain == pytest.approx(factor, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_of_a_rounded_position_the_factor_is_still_found(recording, motion):
     force, place, speed, _ = motion
     step = place.std() / 50
     (pair,) = pairs_of(recording(force, (speed, "velocity", "m/s"), position=np.round(place / step) * step))
-    assert pair.agreement.factor == pytest.approx(1.0, rel=0.05)
+    assert pair.agreement.gain == pytest.approx(1.0, rel=0.05)
 
 
 def lags_of(found: Recording):
@@ -100,7 +100,7 @@ def test_a_measured_force_that_is_late_is_found(recording, motion):
 def test_a_force_behind_a_resonance_is_no_second_view_of_the_command(recording, motion):
     force, place, *_ = motion
     (check,) = lags_of(recording(force, (800 * place, "force", "N")))
-    assert (check.level, "No two channels show the same thing" in check.seen) == ("fine", True)
+    assert (check.level, "No two channels measure the same quantity" in check.seen) == ("fine", True)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_a_force_behind_a_resonance_is_no_second_view_of_the_command(recording, 
     ],
 )
 def test_what_is_later_and_smaller_is_no_wrong_unit(factor, lag, level, words):
-    pair = KinematicPair("position x", "acceleration ax", 2, Agreement(factor, 0.1, lag, 0.9))
+    pair = KinematicPair("position x", "acceleration ax", 2, GainAndLag(factor, 0.1, lag, 0.9))
     (check,) = kinematic_checks([pair], 1000.0)
     assert check.level == level
     assert words in check.do

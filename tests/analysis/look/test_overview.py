@@ -11,11 +11,11 @@ def test_an_intact_recording_has_no_findings(sound):
     found = overview("sound", sound)
     assert not [check for check in found.checks if check.level == "wrong"]
     assert [check.seen for check in found.checks if check.level == "notice"] == [
-        "Nothing repeats, so noise cannot be told from what a model lacks."
+        "Nothing repeats, so noise cannot be distinguished from what a model lacks."
     ]
     assert [(band.command, round(band.low_hz)) for band in found.bands] == [("f1", 0)]
     assert found.coherences[0].share > 0.95
-    assert found.pairs[0].agreement.factor == pytest.approx(1.0, rel=0.01)
+    assert found.pairs[0].agreement.gain == pytest.approx(1.0, rel=0.01)
 
 
 def test_what_is_wrong_comes_first(sound):

@@ -1,4 +1,4 @@
-"""A drift of the response bias is told from criteria that differ between runs without any order."""
+"""A drift of the response bias is distinguished from criteria that differ between runs without any order."""
 
 import numpy as np
 import pytest

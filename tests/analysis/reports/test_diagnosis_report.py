@@ -153,7 +153,7 @@ def test_rivals_that_cannot_be_told_apart_stand_above_those_passed_over(friction
     (effect,) = friction_found.diagnosis.effects
     rivals = (Rival("viscous_damping", 0.1, False, "worse"), Rival("stribeck_friction", 0.05, True, ""))
     table = rival_table(replace(effect, rivals=rivals))
-    assert [row[2] for row in table.rows] == ["named", "cannot be told apart", "passed over"]
+    assert [row[2] for row in table.rows] == ["named", "cannot be distinguished", "passed over"]
 
 
 def test_a_number_without_an_interval_has_a_dash(friction_found):

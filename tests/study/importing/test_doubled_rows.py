@@ -33,7 +33,7 @@ def test_one_stamp_with_other_values_is_refused_with_the_key_that_mends_it(files
     said = refusal(CLOCK, files(**arrays))
     assert "stands still at sample 6" in said
     assert "rate_hz = " in said
-    assert "where a sample was logged twice with other values, take one of both out" in said
+    assert "where a sample was logged twice with other values, remove either of the two" in said
 
 
 def test_rows_are_not_compared_where_the_map_states_the_rate(files):

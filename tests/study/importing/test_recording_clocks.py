@@ -16,7 +16,7 @@ from tests.recording_maps import N, U, Y, built, map_text, refusal
         (lambda t: t.__setitem__(7, t[6]),
          "Clock 'clock': t stands still at sample 7, at 6 s; where the sampling was even "
          "and only the stamps are coarse, state the rate in place of `time` in the map's [[clock]], as in "
-         "rate_hz = 1; where a sample was logged twice with other values, take one of both out."),
+         "rate_hz = 1; where a sample was logged twice with other values, remove either of the two."),
     ],
 )  # fmt: skip
 def test_time_that_is_none_is_refused(files, spoil, sentence):
@@ -45,7 +45,9 @@ def test_stamps_within_the_rounding_of_their_last_decimal_are_even(files, rate_h
     made = built(map_text('time = "t"\ntime_unit = "s"'), files(u=U, y=Y, t=stamps))
     assert made.recording.sample_rate_hz == pytest.approx(rate_hz, rel=1e-3)
     np.testing.assert_array_equal(made.recording.command.samples[:, 0], U)
-    assert any("even but for their last decimal" in note for note in made.notes) == (rate_hz != 100)
+    assert any("uniform apart from the rounding of their last decimal" in note for note in made.notes) == (
+        rate_hz != 100
+    )
 
 
 def test_stamps_that_wander_by_their_last_decimal_are_even_and_that_is_said(files):
@@ -53,7 +55,7 @@ def test_stamps_that_wander_by_their_last_decimal_are_even_and_that_is_said(file
     steps[40:75], steps[300:310] = 0.0099, 0.0101
     made = built(map_text('time = "t"\ntime_unit = "s"'), files(u=U, y=Y, t=np.round(np.cumsum([0, *steps]), 4)))
     assert made.recording.sample_rate_hz == 100
-    assert "they lie up to 0.0035 s from an even grid." in " ".join(made.notes)
+    assert "they lie up to 0.0035 s from a uniform grid." in " ".join(made.notes)
 
 
 @pytest.mark.parametrize(

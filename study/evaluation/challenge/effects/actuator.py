@@ -1,7 +1,15 @@
-"""Actuator effects between command and force.
+"""Concealed effects of the actuator, between the commanded and the exerted force: how strong they are drawn, and built.
 
-Saturation, dead band and gain act on one axis; slew limit, lag and delay on all. The dead band subtracts: a command
-above `width` is reduced by `width`. The lag has one pole. Saturation is a hard limit.
+    saturation   F = clip(u, -limit, limit)                            one axis      limit in N
+    dead band    F = u - width sign(u) where |u| > width, else 0       one axis      width in N
+    gain         F = gain u                                            one axis      1
+    slew limit   |dF/dt| <= rate                                       all axes      rate in N/s
+    lag          time_constant dF/dt + F = u                           all axes      time_constant in s
+    delay        F(t) = u(t - delay)                                   all axes      delay in s
+
+Each range goes from an effect that hardly shows in the recordings of the challenge to a gross fault; the strength (0 to
+1) interpolates geometrically. The ranges were chosen by hand for commands with peaks of 0.5 to 3 N (`LEVELS_N`). The
+compiled force: `actuator_kernel.drive`.
 """
 
 from study.evaluation.challenge.actuator_kernel import DEAD, DELAY_S, GAIN, LAG_S, LIMIT, RATE
@@ -11,6 +19,7 @@ from study.evaluation.challenge.drive_plan import LEVELS_N
 
 
 def _draw_saturation(at: EffectContext) -> dict[str, float]:
+    """Limit (N) that cuts 2 % to 70 % off the strongest command."""
     return {"limit": LEVELS_N[-1] * (1.0 - at.log_between(0.02, 0.7))}
 
 
@@ -19,6 +28,7 @@ def _build_saturation(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_deadband(at: EffectContext) -> dict[str, float]:
+    """Half width (N) of the dead band, 0.003 to 0.2."""
     return {"width": at.log_between(0.003, 0.2)}
 
 
@@ -27,6 +37,7 @@ def _build_deadband(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_slew(at: EffectContext) -> dict[str, float]:
+    """Slew rate (N/s), 4000 (weakest) down to 150."""
     return {"rate": at.log_between(4000.0, 150.0)}
 
 
@@ -35,6 +46,7 @@ def _build_slew(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_lag(at: EffectContext) -> dict[str, float]:
+    """Time constant (s), 0.06 ms to 3 ms."""
     return {"time_constant": at.log_between(6e-5, 3e-3)}
 
 
@@ -43,6 +55,7 @@ def _build_lag(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_delay(at: EffectContext) -> dict[str, float]:
+    """Delay (s), 0.02 ms to 4 ms."""
     return {"delay": at.log_between(2e-5, 4e-3)}
 
 
@@ -51,6 +64,7 @@ def _build_delay(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_gain(at: EffectContext) -> dict[str, float]:
+    """Gain of 0.7 to 0.995, or of 1.005 to 1.3."""
     return {"gain": 1.0 + at.sign() * at.log_between(0.005, 0.3)}
 
 
@@ -66,4 +80,4 @@ EFFECTS = (
     ConcealedEffect("transport_delay", "actuator", False, _draw_delay, _build_delay),
     ConcealedEffect("force_gain", "actuator", True, _draw_gain, _build_gain),
 )
-"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""
+"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""

@@ -1,4 +1,4 @@
-"""Dry friction and a dead band of the actuator, told apart on trapezoidal moves with rests between them."""
+"""Dry friction and a dead band of the actuator, distinguished on trapezoidal moves with rests between them."""
 
 import numpy as np
 import pytest

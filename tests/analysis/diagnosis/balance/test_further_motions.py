@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.balance.balances import motions_in_own_band
 from analysis.diagnosis.balance.motion import motion_band_hz, motions_of
 from analysis.diagnosis.confirm.fitting_measures import choose_fitting_measure
-from analysis.diagnosis.confirm.measures_of_balances import BALANCE_LEAVES_LESS, choose_forces_of_balance
+from analysis.diagnosis.confirm.force_balance_measures import BALANCE_PREDICTS_BETTER, choose_forces_of_balance
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.search_by_simulation import _unseen_by_balance
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -87,7 +87,7 @@ def test_where_no_law_is_named_the_linear_numbers_that_leave_less_of_the_forces_
     given = choose_fitting_measure([recording], hub_and_beam(5 * HUB), (), "force", about_mean=True)
     plain = choose_forces_of_balance([recording], given, balances)
     assert plain.model.mass.shape == (1, 1)
-    assert BALANCE_LEAVES_LESS in plain.chosen.remarks
+    assert BALANCE_PREDICTS_BETTER in plain.chosen.remarks
     left = [rms_of_forces(each) for each in (given, plain)]
     assert left[1] < 0.3 * left[0]
 
@@ -112,7 +112,7 @@ def test_a_constant_force_does_not_decide_which_is_taken(recorded, balance_of, o
     moved = replace(recording, command=command)
     given = choose_fitting_measure([moved], hub_and_beam(5 * HUB), (), "force", about_mean=True)
     plain = choose_forces_of_balance([moved], given, balance_of(moved))
-    assert BALANCE_LEAVES_LESS in plain.chosen.remarks
+    assert BALANCE_PREDICTS_BETTER in plain.chosen.remarks
     assert plain.is_reduced
     assert rms_of_forces(plain) < 0.3 * rms_of_forces(given)
 

@@ -199,7 +199,7 @@ def test_a_model_of_no_device_is_refused(changes, words):
 def test_two_actuators_of_one_motion_are_refused():
     eye = np.eye(2)
     both = MechanicalModel("m", "acceleration", eye, eye, eye, np.ones((2, 2)), eye)
-    assert "2 inputs drive only 1 motion, so they cannot be told apart" in refusal(
+    assert "2 inputs drive only 1 motion, so they cannot be distinguished" in refusal(
         require_model_of, both, [recording(axes=2)]
     )
 

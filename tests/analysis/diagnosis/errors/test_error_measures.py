@@ -25,7 +25,7 @@ from tests.analysis.diagnosis.errors.drifting_plant import (
 def test_a_controlled_plant_that_does_not_hold_itself_is_compared_by_forces(held: Recording) -> None:
     chosen = measure_of([held], model())
     assert chosen.measure.name == "predicted force"
-    assert "command hangs on the response" in chosen.remarks[0]
+    assert "command depends on the response" in chosen.remarks[0]
     assert "compared up to" in chosen.remarks[1]
 
 

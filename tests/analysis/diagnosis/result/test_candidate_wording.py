@@ -22,7 +22,7 @@ DEVICE = Device(single=True, system=LINEAR)
 DRY = Candidate("coulomb_friction", "mechanism", "x", {"level": 0.211}, 0.4, 0.62, "the main part is another")
 STICKY = Candidate(
     "viscoelastic_relaxation", "mechanism", "x", {"stiffness": 120.0, "time_constant": 0.02}, 0.2, 0.3,
-    "no simulation of ours plays it yet",
+    "hapteq cannot simulate it yet",
 )  # fmt: skip
 NAMED = NamedEffect("coulomb_friction", "mechanism", "x", 0.9, 0.68, {"level": Estimate(0.211, "N", (0.20, 0.22))})
 

@@ -5,11 +5,11 @@ import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
 from analysis.evaluation.blind_test.calibration import calibration
+from analysis.evaluation.blind_test.confidence_intervals import pool_share, share, statistic
 from analysis.evaluation.blind_test.detection import classify_outcome, detection_strips, ideal_threshold, shares_by_size
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
 from analysis.evaluation.blind_test.score import is_miss, score
-from analysis.evaluation.blind_test.share import pool_share, share, statistic
 from analysis.evaluation.blind_test.wording import answer_text, describe_concealed, figure_text
 from analysis.figures.blind_test_pictures import blind_test_pictures
 from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report

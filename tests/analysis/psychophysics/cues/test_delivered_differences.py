@@ -167,4 +167,4 @@ def test_the_report_and_the_document_name_the_planted_mismatch(simulate_study, p
     said = "The two directions differed in more than their direction"
     assert pages[3.0].count(said) == 2 and "intensity at 25 Hz" in pages[3.0]
     assert said not in pages[0.1]
-    assert "Too little varied within a direction" in pages[0.1]
+    assert "Delivery varied too little within a direction to test" in pages[0.1]

@@ -106,7 +106,7 @@ def test_the_error_on_what_was_kept_for_a_test_is_the_noise():
 def test_a_plant_without_a_spring_is_said_to_drift():
     fit = fit_mechanical_model([single(quantity="velocity", K=0.0)])
     assert fit.model.stiffness[0, 0] == 0.0
-    assert any("drifts freely" in remark for remark in fit.remarks)
+    assert any("the device drifts under a constant command" in remark for remark in fit.remarks)
     np.testing.assert_allclose([fit.model.mass[0, 0], fit.model.damping[0, 0]], [0.3, 2.0], rtol=0.02)
 
 
@@ -153,7 +153,7 @@ def test_a_sensor_that_counts_the_other_way_is_reported():
     fit = fit_mechanical_model([turned])
     assert fit.model.output[0, 0] == -1.0
     assert fit.model.mass[0, 0] == pytest.approx(0.3, rel=0.02)
-    assert any("other way" in remark for remark in fit.remarks)
+    assert any("opposite to the command" in remark for remark in fit.remarks)
 
 
 def test_a_delay_is_found_where_there_is_one():

@@ -90,7 +90,7 @@ def test_an_order_beyond_what_the_lines_carry(plants, measuring):
 def test_an_order_whose_subspace_cannot_be_told_apart(plants, measuring):
     many = measuring.exact(measuring.small_plant(plants), np.arange(4.6, 38, 0.2), 1e-3)
     text = refusal(many, replace(SETTINGS, order=200))
-    assert "order 200 asks more of the 167 lines in the band than can be told apart" in text
+    assert "order 200 asks more of the 167 lines in the band than can be distinguished" in text
     assert "choose a lower order, such as 100" in text
 
 

@@ -95,7 +95,7 @@ def test_dates_become_seconds(tmp_path):
         ({"f": {"unit": "N", "values": TIME, "flags": TIME}, "t": TIME}, "'f' has 'flags' beside its values"),
         ({"f": {"unit": "N", "values": TIME, "gain": "0.5"}, "t": TIME}, "'f' has 'gain' beside its values"),
         ({"f [lbf]": {"unit": "N", "values": TIME}, "t": TIME}, "header says lbf in 'f [lbf]'"),
-        ({"format": "hapteq.diagnosis/1"}, "a document of ours"),
+        ({"format": "hapteq.diagnosis/1"}, "a hapteq document"),
     ],
 )
 def test_what_cannot_be_read_is_refused_in_words(tmp_path, content, said):

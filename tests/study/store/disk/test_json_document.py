@@ -43,7 +43,7 @@ def test_a_value_that_json_does_not_have_is_refused_before_anything_is_written(p
         ("{", "this is not JSON: Expecting property name"),
         ("[" * 100_000, "this is not JSON: "),
         ('{"f": NaN}', "this is not JSON: JSON has no NaN; write null"),
-        ("[1]", "it holds a list; a document of ours is an object with format and version"),
+        ("[1]", "it holds a list; a hapteq document is an object with format and version"),
         ("{}", "its format is missing, not 'hapteq-anova'"),
         ('{"format": "other", "version": 1}', "its format is 'other', not 'hapteq-anova'"),
         ('{"format": "hapteq-anova"}', "its version is missing; this program reads version 1"),

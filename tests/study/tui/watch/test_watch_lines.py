@@ -59,6 +59,15 @@ def test_nothing_is_told_twice(views):
     assert changes(views[-1], views[-1]) == []
 
 
+def test_motion_across_that_was_not_measured_is_not_reported_as_none(views):
+    view = views[-1]
+    assert any(" across" in line for line in status(view))
+    unknown = replace(view, last=tuple(replace(trial, off_axis_mps2=None) for trial in view.last))
+    lines = [line for line in status(unknown) if line.startswith("Last")]
+    assert any("m/s²" in line for line in lines)
+    assert not any("across" in line for line in lines)
+
+
 def test_the_end_is_reported(views):
     assert told(views)[-1] == "FINISHED: all runs are done"
 

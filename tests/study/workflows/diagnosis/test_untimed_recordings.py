@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.confirm.measures_of_balances import list_fitting_measures
+from analysis.diagnosis.confirm.force_balance_measures import list_fitting_measures
 from analysis.diagnosis.data.measured_motion import is_quasi_static
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.document import Mismatch

@@ -7,7 +7,7 @@ import pytest
 from openpyxl import Workbook
 
 from study.workflows.recording.import_recording import ImportPlan, import_recording
-from study.workflows.recording.recording_from import read_any_recording
+from study.workflows.recording.read_any_recording import read_any_recording
 
 NAMES = ("time [s]", "force [N]", "speed [mm/sec]")
 ROWS = [(k / 100, float(k % 7), float(k % 5)) for k in range(60)]

@@ -9,7 +9,7 @@ from study.errors import StudyError, WrongUseError
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.recording.import_recording import ImportPlan, import_recording
-from study.workflows.recording.recording_from import read_any_recording
+from study.workflows.recording.read_any_recording import read_any_recording
 
 T = np.arange(200) / 1000
 TABLE = "time [s],fx [N],ax [g]\n" + "\n".join(f"{t:.3f},{np.sin(99 * t):.6f},{t * t:.9f}" for t in T) + "\n"
@@ -144,7 +144,7 @@ def test_a_table_of_others_is_looked_at_and_read_as_it_is(tmp_path):
     (tmp_path / "a.csv").write_text(TABLE)
     found, notes = read_any_recording(tmp_path / "a.csv")
     assert (found.command.channels, found.response.unit) == (("fx",), "m/s^2")
-    assert notes[0] == "a.csv is no recording of ours: it was imported in memory."
+    assert notes[0] == "a.csv is no hapteq recording: it was imported in memory."
     write_recording(tmp_path / "r.h5", found)
     assert read_any_recording(tmp_path / "r.h5")[1] == ()
     (tmp_path / "b.csv").write_text(TABLE.replace("fx [N]", "knob"))

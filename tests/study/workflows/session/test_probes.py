@@ -19,7 +19,7 @@ from study.session.facts.events import (
 )
 from study.session.state.draw_check import LogContradiction
 from study.session.state.fold import apply
-from study.session.state.probing import ProbingState, after_break
+from study.session.state.probe_state import ProbeState, after_break
 from study.session.stimulus.probe_stimulus import probe_stimulus, reference_commands
 from study.session.views.views import PlayingNotice
 from study.store.formats.recording_file import read_recording
@@ -133,7 +133,7 @@ def test_the_free_handle_is_compared_at_the_level_of_the_probe_in_the_hand(probe
 
 @pytest.mark.parametrize(("paused_s", "since_s", "mass_kg"), [(200.0, None, None), (30.0, 0.0, 0.4)])
 def test_after_a_pause_no_probe_compares_with_the_grip_before_it(paused_s, since_s, mass_kg):
-    before = ProbingState(played=3, with_hand=2, since_s=50.0, referenced=True, hand_mass_kg=0.4, hand_level_n=0.2)
+    before = ProbeState(played=3, with_hand=2, since_s=50.0, referenced=True, hand_mass_kg=0.4, hand_level_n=0.2)
     after = after_break(before, PauseTaken("2026-01-01T00:00:00.000+00:00", "participant", paused_s), PROBES)
     assert (after.since_s, after.hand_mass_kg, after.referenced) == (since_s, mass_kg, paused_s < 120)
 
@@ -185,7 +185,7 @@ def test_a_probe_within_a_trial_or_above_its_cap_is_refused_by_the_log(probed):
     probe = ProbePlayed("2026-01-01T00:00:00.000+00:00", number, "hand", 0.8)
     with pytest.raises(LogContradiction, match="allows 1 N"):
         apply(state, replace(probe, level_n=1.01))
-    with pytest.raises(LogContradiction, match="after"):
+    with pytest.raises(LogContradiction, match="is the next"):
         apply(state, replace(probe, number=number + 1))
     within = replace(state, presented=TrialPresented.__new__(TrialPresented))
     with pytest.raises(LogContradiction, match="while a trial is open"):

@@ -1,8 +1,11 @@
-"""Error measures with linear parameters from the force balances, in place of those of the model fitted to spectra.
+"""Error measures for a model whose mass, damping and stiffness come from the force balance.
 
-A measure says how a model is compared with a recording (free simulation, windows, predicted force) and in which band.
-Where the balances name laws, several measures are tried in which these may be confirmed; where they name none, the
-balances' linear model is taken if it leaves less of the forces than the fitted one.
+An error measure says how a model is compared with a recording (free simulation, simulation in windows, force predicted
+along the measured motion) and in which band. A force balance is a linear regression of the commanded force on the
+measured motion: M a + B v + K x + laws = command (`analysis.diagnosis.balance`). Where no model was given, there are
+two linear models: one fitted to spectra, and that of the balance. Where the balance names laws, this file lists the
+measures in which those laws may be fitted and confirmed. Where it names none, the model of the balance replaces the
+model fitted to spectra if it predicts the forces with a smaller error.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,20 +24,21 @@ from analysis.diagnosis.settings import LAWS_WITHIN
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 
-BALANCE_LEAVES_LESS = (
-    "Forces are predicted with the linear parameters of the force balance and a constant: they leave less of the "
-    "forces than the model that was fitted to spectra."
+BALANCE_PREDICTS_BETTER = (
+    "Forces are predicted with the linear parameters of the force balance and a constant, because their error is "
+    "smaller than with the model that was fitted to spectra."
 )
 
 
 def list_fitting_measures(
     recordings: Sequence[Recording], model: MechanicalModel, balances: Sequence[Balance], compared: Compared
 ) -> Iterator[FittingMeasure]:
-    """The measures to try for the laws that the balances name, the strictest first; none where none is named.
+    """The measures to try for the laws that the balances name, the strictest first; none where no law is named.
 
-    First a free simulation, or windows of one, where the fitted model allows it. Then forces along the measured motion
-    with the balances' linear parameters: in the band where noise is small, if that holds most of the laws' power, and
-    in the band of the balances. compared: "motion" or "force" where the user wants only that compared.
+    First a free simulation, or a simulation in windows, where the fitted model allows it. Then the force predicted
+    along the measured motion with the linear parameters of the balances: in the band where noise is small, if that
+    holds most of the laws' power, and in the band of the balances. compared: "motion" or "force" where the user wants
+    only that compared.
     """
     if not any(balance.named for balance in balances):
         return
@@ -64,10 +68,13 @@ def list_fitting_measures(
 def choose_forces_of_balance(
     recordings: Sequence[Recording], fitting: FittingMeasure, balances: Sequence[Balance]
 ) -> FittingMeasure:
-    """The measure with the balances' own linear parameters, where forces are compared, no law is named, and these leave
-    less of the forces than the fitted model, on the samples to fit and to choose by; else `fitting` unchanged. A model
-    fitted to spectra in closed loop may need modes that are unnecessary where the motion of a second body is
-    measured."""
+    """The measure with the linear parameters of the balances, if it predicts the forces better; else `fitting`
+    unchanged.
+
+    It can replace `fitting` only where forces are compared and no law is named. Better: a smaller error on the samples
+    to fit and to choose by. A model fitted to spectra in closed loop may need modes that are unnecessary where the
+    motion of a second body is measured.
+    """
     given = fitting.chosen.measure
     named, first = any(balance.named for balance in balances), recordings[0]
     if not balances or named or is_quasi_static(first) or is_read_as_free(first):
@@ -82,23 +89,25 @@ def choose_forces_of_balance(
     except (MechanicalModelError, np.linalg.LinAlgError):
         return fitting
     measure = chosen.measure
-    if not isinstance(measure, PredictedForce) or not _leaves_less((linear, measure), (fitting.model, given)):
+    if not isinstance(measure, PredictedForce) or not _predicts_better((linear, measure), (fitting.model, given)):
         return fitting
     remarks = tuple(remark for remark in fitting.chosen.remarks if remark != ABOUT_MEAN)
-    chosen = replace(chosen, remarks=(*remarks, BALANCE_LEAVES_LESS))
+    chosen = replace(chosen, remarks=(*remarks, BALANCE_PREDICTS_BETTER))
     return FittingMeasure(linear, chosen, is_reduced=is_reduced(balances))
 
 
 def _model_of_balances(
     recordings: Sequence[Recording], balances: Sequence[Balance], name: str
 ) -> tuple[Sequence[Recording], MechanicalModel | None]:
-    """The recordings with one body per command, and the balances' linear model of it; None where there is none."""
+    """The recordings with one body per command, and the linear model that the balances' parameters make of it; None
+    where they make no model."""
     reduced = reduce_recordings(recordings, balances) if is_reduced(balances) else recordings
     return reduced, first_model(balances, reduced[0], name)
 
 
 def _predict_about_mean(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float) -> MeasureChoice:
-    """The measure by force with a constant command that makes the mean error zero: the balance, too, has one."""
+    """The measure by force with a constant command that makes the mean error zero, because the regression of the
+    balance has a constant, too."""
     chosen = measure_by_force(recordings, model, band_hz)
     if not isinstance(chosen.measure, PredictedForce):
         return chosen
@@ -109,9 +118,12 @@ Prediction = tuple[MechanicalModel, PredictedForce]
 """A model, and the measure by which its predicted forces are compared with the commands."""
 
 
-def _leaves_less(linear: Prediction, given: Prediction) -> bool:
-    """Whether the forces that the first model needs are closer to the commands than the second's: the mean over the
-    axes of the error's power over the command's, on the samples to fit and to choose by of both."""
+def _predicts_better(linear: Prediction, given: Prediction) -> bool:
+    """Whether the model of the balance (`linear`) predicts the commands with a smaller error than the given one.
+
+    The error is mean over axes of (power of predicted force minus command) / (power of the command), over the samples
+    to fit and to choose by of both measures; axes without a command are left out.
+    """
     kept = [
         (own.fit | own.choose) & (other.fit | other.choose)
         for own, other in zip(linear[1].records, given[1].records, strict=True)

@@ -1,4 +1,5 @@
-"""Read a recording from any file: directly, or imported in memory."""
+"""Read a recording from any file: a hapteq recording directly, a foreign file (table, MATLAB, NumPy, …) imported in
+memory, without a map."""
 
 from pathlib import Path
 
@@ -9,10 +10,11 @@ from study.store.formats.recording_file import read_recording
 
 
 def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
-    """A recording of ours, or foreign tables or arrays imported in memory, and remarks. Raises StudyError."""
+    """The recording in a file, and remarks on its import; none for a hapteq recording. Raises StudyError where the file
+    cannot be read, or a foreign file needs a map."""
     if path.is_file() and is_hdf5(path) and format_of(path):
         return read_recording(path), ()
-    # Here, for the import takes longer to load than a recording of ours to read.
+    # Imported here, because loading the import takes longer than reading a hapteq recording.
     from study.importing.arrays.arrays import FOREIGN
     from study.importing.map_format.map_errors import MapNeededError
     from study.workflows.recording.import_recording import read_foreign
@@ -28,4 +30,4 @@ def read_any_recording(path: Path) -> tuple[Recording, tuple[str, ...]]:
             f"hapteq import {path} --out REC.h5 > MAP.toml prints one: complete it, import with --map MAP.toml, and "
             "give REC.h5.",
         ) from needed
-    return found.recording, (f"{path.name} is no recording of ours: it was imported in memory.", *found.notes)
+    return found.recording, (f"{path.name} is no hapteq recording: it was imported in memory.", *found.notes)

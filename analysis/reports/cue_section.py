@@ -1,4 +1,10 @@
-"""The section of a study report that asks whether direction was the cue."""
+"""Section of a study report on whether the direction was the cue, or another difference between the stimuli.
+
+The experiment asks for the direction of a vibration. The device may deliver the two directions with different
+amplitudes, harmonics or motion across the direction, and a participant may answer by such a difference instead. Two
+tables per cue and frequency: the sensitivity d' that the cue alone would give (`cue_ability`), and whether answers
+depended on it (`answers_on_delivery`, logistic regression).
+"""
 
 from collections.abc import Sequence
 
@@ -12,29 +18,32 @@ from analysis.wording import NONE, conjoin, format_signed, number, p_value
 from protocols.definition.staircase_rule import StaircaseRule
 
 _MEANING = (
-    "A device seldom delivers both directions alike. What else differs can be noticed in place of the direction: how "
-    "strong the vibration is along its direction (intensity), its harmonics (spectrum), the motion across it "
-    "(coupling). Each is in dB; harmonics and motion across count by the most that they can add to the amplitude."
+    "A device seldom delivers both directions alike. A participant may notice another difference in place of the "
+    "direction: the amplitude along the direction (intensity), the harmonics (spectrum), or the motion across the "
+    "direction (coupling). Each is in dB; harmonics and motion across count by the most that they can add to the "
+    "amplitude."
 )
 
 
 def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:
-    """Section on cues other than the direction; empty where no trial was measured."""
+    """Section on cues other than the direction; empty where no trial was measured. found: a finding per cue and
+    frequency. gaps: trials without a measured delivery. rule: of the staircase, for the words on sensitivity."""
     if not found:
         return []
-    sentences = (*(cue_warnings(found) or (_nothing(found),)), *filter(None, [gap_text(gaps)]))
+    sentences = (*(cue_warnings(found) or (_no_cue_text(found),)), *filter(None, [gap_text(gaps)]))
     tables = (_ability_table(found, threshold_words(rule).sensitivity), _answer_table(found))
     return [Section("Was direction the cue?", paragraphs=(_MEANING, *sentences), tables=tables)]
 
 
-def _nothing(found: Sequence[CueFinding]) -> str:
+def _no_cue_text(found: Sequence[CueFinding]) -> str:
+    """The result where no cue is shown to be noticeable or followed, with the cues that could not be tested."""
     unclear = [f"{each.cue.value} at {each.frequency_hz:g} Hz" for each in found if not each.answers.is_conclusive]
     return (
-        "No difference that was measured is one that a usual judge notices, and no answers are shown to follow what "
-        "was delivered."
+        f"No measured difference is one that a participant with an internal noise of {USUAL_NOISE_DB:g} dB notices, "
+        "and no answers are shown to depend on what was delivered."
         + (
-            f" Too little varied within a direction to tell whether answers would have followed: {conjoin(unclear)}. "
-            "A roved level (rove_db of [stimulus]) would tell for intensity."
+            f" Delivery varied too little within a direction to test whether answers depend on it: {conjoin(unclear)}. "
+            "A roved level (rove_db of [stimulus]) allows the test for intensity."
             if unclear
             else ""
         )
@@ -42,8 +51,9 @@ def _nothing(found: Sequence[CueFinding]) -> str:
 
 
 def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
+    """A row per cue and frequency. sensitivity: what d' the staircase aims at, as a sentence."""
     return Table(
-        caption="What each cue alone could do",
+        caption="Sensitivity that each cue alone would give",
         header=(
             "Cue", "Frequency", "Difference (dB)", "Largest", "Spread (dB)",
             *(f"d' at {noise:g} dB" for noise in INTERNAL_NOISE_DB), "d' of the answers", "Noticeable for",
@@ -60,8 +70,8 @@ def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
         notes=(
             "Difference: first direction minus second, by their angles; medians over participants, and the largest of "
             "any. Spread: standard deviation over trials of one direction at one level, roving included. d' = "
-            "difference over internal noise and spread together, for three internal noises; 1 is one just noticeable "
-            "difference.",
+            "difference over internal noise and spread (root of the sum of squares), for three internal noises; d' = 1 "
+            "is one just noticeable difference.",
             f"Noticeable: shown, by a 95 % interval of the difference, to reach d' 1 at an internal noise of "
             f"{USUAL_NOISE_DB:g} dB. {sensitivity}",
         ),
@@ -70,32 +80,34 @@ def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
 
 def _answer_table(found: Sequence[CueFinding]) -> Table:
     return Table(
-        caption="Whether answers followed the delivery within a direction",
-        header=("Cue", "Frequency", "Trials", "Varied by (dB)", "Logits per dB", "95 % interval", "p (Holm)", "Says"),
+        caption="Whether answers depend on the delivery within a direction",
+        header=("Cue", "Frequency", "Trials", "Spread (dB)", "Logits per dB", "95 % interval", "p (Holm)", "Answers"),
         rows=tuple(
             (
                 each.cue.value, f"{each.frequency_hz:g} Hz", str(each.answers.trials),
-                number(each.answers.residual_sd_db, 3), *_slope_texts(each.answers), p_value(each.p_holm), _judge(each),
+                number(each.answers.residual_sd_db, 3), *_slope_texts(each.answers), p_value(each.p_holm),
+                _verdict(each),
             )
             for each in found
         ),
         notes=(
             "Logistic regression of answers on each trial's deviation from the others of that participant, direction "
             "and level. "
-            f"A participant with an internal noise of {USUAL_NOISE_DB:g} dB who goes by the cue alone has "
-            f"{number(RELYING, 1)} logits per dB, one who feels directions has 0.",
+            f"A participant with an internal noise of {USUAL_NOISE_DB:g} dB who answers by the cue alone has "
+            f"{number(RELYING, 1)} logits per dB; a participant who answers by the direction has 0.",
         ),
         folded=True,
     )  # fmt: skip
 
 
 def _slope_texts(answers: AnswersOnDelivery) -> tuple[str, str]:
+    """Slope of the regression (logits per dB) and its 95 % interval."""
     if answers.slope is None or answers.lower is None or answers.upper is None:
         return NONE, NONE
     return format_signed(answers.slope), f"{format_signed(answers.lower)} to {format_signed(answers.upper)}"
 
 
-def _judge(finding: CueFinding) -> str:
+def _verdict(finding: CueFinding) -> str:
     if finding.followed:
-        return "followed"
-    return "not followed" if finding.answers.is_conclusive else "cannot tell"
+        return "depend on the cue"
+    return "do not" if finding.answers.is_conclusive else "not testable"

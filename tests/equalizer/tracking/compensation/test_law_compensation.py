@@ -9,7 +9,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
-from equalizer.tracking.compensation.law_forces import COMMANDS, FOLDED, REMEMBERS, SENSED, SEVERAL
+from equalizer.tracking.compensation.law_compensation import COMMANDS, FOLDED, REMEMBERS, SENSED, SEVERAL
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 
 RATE_HZ, BAND_HZ, N = 1000.0, (5.0, 35.0), 1000
@@ -86,6 +86,22 @@ def test_a_command_map_is_undone():
 
 
 @pytest.mark.parametrize(
+    "law", ["0.1*fy", "maximum(fy - 3.0, 0.0) + minimum(fy + 3.0, 0.0)"], ids=["a weak actuator", "a wide dead band"]
+)
+def test_a_command_map_is_inverted_where_it_needs_a_command_far_above_the_force(law):
+    done = compensate(PUSHED, WANTED, MODEL, physics(found(law, "command")), None)
+    commands = done.forces[:, 1]
+    passed = 0.1 * commands if "0.1" in law else np.maximum(commands - 3, 0) + np.minimum(commands + 3, 0)
+    assert done.not_used == ()
+    assert passed == pytest.approx(PUSHED[:, 1], abs=0.01)
+
+
+def test_a_force_beyond_saturation_gets_the_smallest_range_of_commands():
+    done = compensate(PUSHED, WANTED, MODEL, physics(found("0.1*tanh(fy/0.1)", "command")), None)
+    assert np.abs(done.forces[:, 1]).max() <= 2 * np.abs(PUSHED[:, 1]).max() * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
     ("text", "acts_on", "why"),
     [
         ("0.1*fy*sin(y/0.01)", "force", COMMANDS),
@@ -99,7 +115,7 @@ def test_a_command_map_is_undone():
 def test_what_cannot_be_compensated_says_why(text, acts_on, why):
     known = physics(found(text, acts_on))
     if not why:
-        with pytest.raises(ValueError, match="goes up and down, so it cannot be undone"):
+        with pytest.raises(ValueError, match="falls somewhere, so it has no inverse"):
             compensate(PUSHED, WANTED, MODEL, known, None)
         return
     done = compensate(PUSHED, WANTED, MODEL, known, None)

@@ -1,0 +1,85 @@
+"""Shares, medians and means of a blind test, each with a 95 % confidence interval.
+
+A share of independent cases has Wilson's score interval, which holds for few cases and for shares near 0 and 1. A share
+of cases that come in dependent groups, and a median or mean, have a percentile bootstrap interval.
+
+References: Wilson, Journal of the American Statistical Association 22 (1927), 209; Efron and Tibshirani, An
+Introduction to the Bootstrap (1993), chapter 13; Davison and Hinkley, Bootstrap Methods and their Application (1997),
+section 3.8 (groups resampled as a whole).
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from statsmodels.stats.proportion import proportion_confint
+
+from equalizer.signals.signal import FloatArray
+
+Item = TypeVar("Item")
+RESAMPLED = 2000
+"""Resamples of a bootstrap interval."""
+_QUANTILES = (0.025, 0.975)
+_GROUP_SEED, _VALUE_SEED = 21, 20
+"""Fixed seeds: the same cases always give the same interval."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A share, or a statistic of values, with its 95 % confidence interval."""
+
+    name: str
+    value: float | None
+    """The share (0 to 1), or the statistic in the unit of its values; None without any case."""
+    low: float | None
+    """Lower end of the interval."""
+    high: float | None
+    """Upper end of the interval."""
+    of: int
+    """Number of cases, or of values."""
+    hits: int | None = None
+    """Number of cases that count towards a share; None for a statistic."""
+
+
+def share(name: str, among: Sequence[Item], right: Callable[[Item], bool]) -> Figure:
+    """Share of the items among `among` for which `right` is true, with Wilson's interval; without a value where there
+    are no items."""
+    hits, of = sum(right(each) for each in among), len(among)
+    if not of:
+        return Figure(name, None, None, None, 0, 0)
+    low, high = wilson(hits, of)
+    return Figure(name, hits / of, low, high, of, hits)
+
+
+def wilson(hits: float, of: int) -> tuple[float, float]:
+    """Lower and upper end of Wilson's 95 % score interval of a proportion. hits: successes, 0 to `of`. of: trials, at
+    least 1."""
+    low, high = proportion_confint(hits, of, method="wilson")
+    return float(low), float(high)
+
+
+def pool_share(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
+    """Share of true items in all groups together, whose items depend on each other: the interval resamples groups as a
+    whole (cluster bootstrap). Empty groups are left out; without a value where all are empty."""
+    hits = np.array([sum(group) for group in groups if group], dtype=np.float64)
+    of = np.array([len(group) for group in groups if group], dtype=np.float64)
+    if not len(of):
+        return Figure(name, None, None, None, 0, 0)
+    drawn = np.random.default_rng(_GROUP_SEED).integers(len(of), size=(RESAMPLED, len(of)))
+    low, high = np.quantile(hits[drawn].sum(axis=1) / of[drawn].sum(axis=1), _QUANTILES)
+    return Figure(name, float(hits.sum() / of.sum()), float(low), float(high), int(of.sum()), int(hits.sum()))
+
+
+def statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArray]) -> Figure:
+    """A statistic of the finite values, with its bootstrap interval; without a value where none is finite.
+
+    reduce: function of an array (resamples, values) and `axis=1`, such as np.median or np.mean.
+    """
+    known = np.array([value for value in values if np.isfinite(value)], dtype=np.float64)
+    if not len(known):
+        return Figure(name, None, None, None, 0)
+    value = float(reduce(known[None, :], axis=1)[0])
+    drawn = np.random.default_rng(_VALUE_SEED).integers(len(known), size=(RESAMPLED, len(known)))
+    low, high = np.quantile(reduce(known[drawn], axis=1), _QUANTILES)
+    return Figure(name, value, float(low), float(high), len(known))

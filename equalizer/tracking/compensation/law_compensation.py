@@ -1,0 +1,142 @@
+"""Compensation of discovered laws in a feedforward.
+
+A discovered law is a formula that a diagnosis found and that no effect of the catalogue states. A law of the force is
+cancelled along the planned motion: -law(x, v, a) is added to the command. A law of the command (a command map g, static
+and of one command) is inverted: the command u with g(u) = intended force is sent. Laws of a sensor, and laws with
+memory of the command, are left alone with a reason.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from equalizer.laws.evaluate import evaluate
+from equalizer.laws.law import Law
+from equalizer.laws.parse import MEMORY
+from equalizer.laws.tree import Apply, Node, Number, Variable, format_formula, nodes
+from equalizer.signals.signal import FloatArray
+from equalizer.tracking.compensation.known_forces import Law as ForceAgainst
+from equalizer.tracking.feedforward.planned_motion import PlannedMotion
+
+MOTION = ("", "v", "a")
+"""Prefixes of the signals of a motion, before the letter of the axis: position, velocity, acceleration."""
+TABLE = 2001
+"""Samples of the table by which a command map is inverted."""
+REACH = 2.0
+"""Range of that table at first, as a multiple of the largest intended force: enough for gains of 0.5 or more."""
+_MOST_DOUBLINGS = 12
+"""How often the range is doubled where the map does not reach the intended force in it: gains down to 1e-4."""
+_SPANS = tuple(10.0**decade for decade in range(5))
+"""Ranges of commands, in the command's unit, within which a map is tested for rising."""
+PLAYED = 1000.0
+"""Sample rate (Hz) at which a law without memory is evaluated; any value gives the same result."""
+COMMANDS = "it depends on the command, which its compensation would change, or on the time"
+REMEMBERS = "it has memory of earlier commands, so no map of the present command inverts it"
+SEVERAL = "it depends on several commands or on the time"
+FOLDED = "the force does not rise with the command, so the map has no inverse"
+SENSED = "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
+
+
+def reason_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
+    """Why a law is not compensated, as a clause after "because"; empty for a law that is. letters: those of the axes,
+    in their order."""
+    known = {prefix + letter for letter in letters for prefix in MOTION}
+    if law.acts_on == "response":
+        return SENSED
+    if law.acts_on == "force":
+        return "" if set(law.variables) <= known else COMMANDS
+    if any(isinstance(node, Apply) and node.name in MEMORY for node in nodes(law.tree)):
+        return REMEMBERS
+    if len(law.variables) != 1 or law.variables[0] not in (f"f{law.axis[-1:]}", law.axis):
+        return SEVERAL
+    tables = (_tabulate(law, span)[1] for span in _SPANS)
+    return "" if any(np.isfinite(forces).all() and (np.diff(forces) > 0).any() for forces in tables) else FOLDED
+
+
+def compute_compensating_force(
+    law: Law, letters: tuple[str, ...], motion: PlannedMotion, rate_hz: float, slip: float
+) -> FloatArray:
+    """(N,), in the unit of the command: the force to be added to the command, which cancels that of the law. slip: the
+    speed (m/s) below which a change of sign of a velocity is smoothed, because a force that jumps cannot be played."""
+    columns = {
+        prefix + letter: column[:, axis]
+        for axis, letter in enumerate(letters)
+        for prefix, column in zip(MOTION, (motion.position, motion.velocity, motion.acceleration), strict=True)
+    }
+    return -evaluate(_smooth_signs(law, slip), columns, rate_hz)
+
+
+def single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceAgainst:
+    """The law along a sinusoid of this axis while the other axes rest, in the form that `equivalent_impedance` takes.
+    axis: its index in `letters`."""
+
+    def against(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+        # Of a sinusoid, rms velocity over rms position is the angular frequency (rad/s).
+        omega = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
+        still = np.zeros((len(x), len(letters)))
+        motion = PlannedMotion(still, still.copy(), still.copy())
+        motion.position[:, axis], motion.velocity[:, axis], motion.acceleration[:, axis] = x, v, -(omega**2) * x
+        # The samples are two cycles, so that memory has settled in the second.
+        return compute_compensating_force(law, letters, motion, len(x) / 2 * omega / (2 * np.pi), slip)
+
+    return against
+
+
+def linear_share(law: Law, amplitude: float) -> float:
+    """Describing function N(A) of a command map g for the command A sin(p): the gain of the fundamental,
+
+        N(A) = 1 / (pi A) integral over 0 to 2 pi of g(A sin p) sin p dp
+
+    amplitude: A, in the command's unit (Gelb and Vander Velde, Multiple-Input Describing Functions, 1968, chapter 2).
+    """
+    wave = np.sin(2 * np.pi * (np.arange(TABLE) + 0.5) / TABLE)
+    passed = evaluate(law, {law.variables[0]: amplitude * wave}, PLAYED)
+    return float(2 * np.mean(passed * wave) / amplitude)
+
+
+def invert_command_map(law: Law, meant: FloatArray) -> FloatArray:
+    """(N,): the commands that a command map turns into the intended forces `meant` (N,).
+
+    By linear interpolation in a table, whose range grows until the map reaches the largest intended force. Where the
+    map never does (saturation), the command is that of the nearest force in the first range. Raises ValueError where
+    the map falls in the first range.
+    """
+    span = REACH * max(float(np.abs(meant).max()), np.finfo(np.float64).tiny)
+    first = None
+    for doubling in range(_MOST_DOUBLINGS + 1):
+        commands, forces = _tabulate(law, span * 2**doubling)
+        if not _is_rising(forces):
+            break
+        if forces[0] <= meant.min() and meant.max() <= forces[-1]:
+            return np.asarray(np.interp(meant, forces, commands))
+        first = first or (commands, forces)
+    if first is None:
+        raise ValueError(
+            f"the command map {law.text} falls somewhere, so it has no inverse; leave it out of what is compensated"
+        )
+    return np.asarray(np.interp(meant, first[1], first[0]))
+
+
+def _tabulate(law: Law, span: float) -> tuple[FloatArray, FloatArray]:
+    """(TABLE,) each: commands from -span to span, and the forces that a command map makes of them."""
+    commands = np.linspace(-span, span, TABLE)
+    return commands, evaluate(law, {law.variables[0]: commands}, PLAYED)
+
+
+def _is_rising(forces: FloatArray) -> bool:
+    return bool(np.isfinite(forces).all() and (np.diff(forces) >= 0).all())
+
+
+def _smooth_signs(law: Law, slip: float) -> Law:
+    """The law with sign(v) replaced by tanh(v / slip) for each velocity v, as for the friction of the catalogue."""
+    tree = _smooth_node(law.tree, slip)
+    return Law(format_formula(tree, None, None), law.numbers, law.units, law.acts_on, law.axis)
+
+
+def _smooth_node(node: Node, slip: float) -> Node:
+    match node:
+        case Apply("sign", (Variable(name) as velocity,)) if name.startswith("v") and slip > 0:
+            return Apply("tanh", (Apply("/", (velocity, Number(slip))),))
+        case Apply(name, parts):
+            return Apply(name, tuple(_smooth_node(part, slip) for part in parts))
+    return node

@@ -1,0 +1,88 @@
+"""Sample rate of time stamps that are uniform apart from skipped rows and the rounding of their last decimal.
+
+A logger writes each stamp rounded to a decimal place, and may skip a row now and then. `fit_uniform_rate` finds the
+rate f and the integers k_i with t_i - t_0 = k_i / f up to a tolerance; where there are none, stamps are not uniform.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from study.importing.expressions.functions import Value
+
+IntArray = npt.NDArray[np.int64]
+
+UNEVEN = 0.02
+"""Tolerance for uniform stamps: largest deviation from the grid, as a fraction of a step. By hand."""
+LEFT_OUT = 0.02
+"""Largest fraction of rows that a uniform logger skips; if more steps are long, stamps were rounded instead. By
+hand."""
+_MOST_DECIMALS = 6
+"""Most decimals of a time stamp that are looked for, in the unit of the file: a microsecond where that is the
+second."""
+_BINARY = 1e-3
+"""Tolerance, in units of the last decimal, for the rounding of binary numbers: a small difference of large stamps is
+not an exact decimal."""
+_PLAIN_DIGITS = (4, 5, 6)
+"""Significant digits to which a rate is rounded before it is tried as the exact one, the fewest first."""
+
+
+def fit_uniform_rate(stamps_s: Value, unit_s: float) -> tuple[float, IntArray | None]:
+    """Rate (Hz) and sample index of each stamp (n,); 0 and None for stamps that are not uniform.
+
+    Tried are the mean rate, which is right where no row is missing, and that of the median step, which is right where
+    some are; each first rounded (1000 for 1000.0003). unit_s: unit of the stamps' last decimal place.
+    """
+    since_s = stamps_s - stamps_s[0]
+    mean_hz = (len(stamps_s) - 1) / float(since_s[-1])
+    usual_hz = 1 / float(np.median(np.diff(stamps_s)))
+    for about_hz in (mean_hz, usual_hz):
+        for rate_hz in (*(float(f"{about_hz:.{digits}g}") for digits in _PLAIN_DIGITS), about_hz):
+            places = np.round(since_s * rate_hz).astype(np.int64)
+            uneven = np.max(np.abs(since_s * rate_hz - places))
+            steps = np.diff(places)
+            if uneven <= UNEVEN and (steps >= 1).all() and np.mean(steps > 1) <= LEFT_OUT:
+                return rate_hz, places
+    rate_hz = _estimate_rounded_rate(since_s, unit_s)
+    return rate_hz, np.arange(len(stamps_s)) if rate_hz else None
+
+
+def _estimate_rounded_rate(since_s: Value, unit_s: float) -> float:
+    """Rate (Hz) of stamps without a gap that are uniform apart from rounding to their last decimal place; else 0.
+
+    Rounding moves a stamp by at most half a unit of that place, so deviations from the grid must lie within one unit.
+    Among rates whose deviations are nearly as small as those of the mean rate, that with the fewest digits is taken.
+    Otherwise the rate of the median step is taken where stamps wander slowly: single steps differ from it by one unit
+    of a fine decimal, and no stamp deviates by half a step.
+    """
+    ticks = np.round(np.diff(since_s) / unit_s) if unit_s else np.zeros(1)
+    if ticks.min() < 1 or _skips_rows(ticks):
+        return 0.0
+    numbers = np.arange(len(since_s))
+    mean_hz = (len(since_s) - 1) / float(since_s[-1])
+    least = float(np.ptp(since_s * mean_hz - numbers)) + UNEVEN
+    for rate_hz in (*(float(f"{mean_hz:.{digits}g}") for digits in range(1, max(_PLAIN_DIGITS) + 1)), mean_hz):
+        if np.ptp(since_s * rate_hz - numbers) <= min(unit_s * rate_hz * (1 + _BINARY), least):
+            return rate_hz
+    usual_hz = 1 / float(np.sort(ticks)[len(ticks) // 2] * unit_s)
+    deviation, unit = since_s * usual_hz - numbers, unit_s * usual_hz * (1 + _BINARY)
+    wanders = unit <= UNEVEN * (1 + _BINARY) and np.max(np.abs(np.diff(deviation))) <= unit
+    wanders = wanders and np.max(np.abs(deviation)) < 0.5
+    return usual_hz if wanders else 0.0
+
+
+def _skips_rows(ticks: Value) -> bool:
+    """Whether rows were skipped: all steps are multiples of the shortest, and no more of them are longer than
+    `LEFT_OUT` allows, plus three standard deviations of a Poisson count. ticks: (n - 1,), steps in units of the last
+    decimal."""
+    expected = LEFT_OUT * len(ticks)
+    skipped = np.count_nonzero(ticks > ticks.min())
+    return not (ticks % ticks.min()).any() and bool(skipped <= expected + 3 * np.sqrt(expected) + 1)
+
+
+def last_decimal(stamps: Value) -> float:
+    """Unit of the last decimal place of the stamps, such as 0.001; 0 with more than `_MOST_DECIMALS` decimals."""
+    for digits in range(_MOST_DECIMALS + 1):
+        whole = stamps * 10**digits
+        if (np.abs(whole - np.round(whole)) <= _BINARY).all():
+            return float(10**-digits)
+    return 0.0

@@ -1,0 +1,121 @@
+"""State of a session's probes and references, computed from its log, and which of them is due next.
+
+A probe is a known multisine force of about a second, played between two trials; the acceleration that it causes gives
+the apparent mass of the handle with the hand on it, and so shows whether device or grip changed during the session. A
+reference is a longer force with no hand on the handle, played once per sitting and again after a long pause; it shows
+the device alone. Their forces: `study.session.stimulus.probe_stimulus`; their settings: `[probes]` of a protocol.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from study.session.facts.sitting_events import PauseTaken, ProbeMeasured, ProbePlayed, RestTaken
+from study.session.state.draw_check import LogContradiction
+
+if TYPE_CHECKING:
+    from protocols.definition.probes import ProbeSettings
+
+LARGEST_WEIGHT_HZ = 11.4
+"""Frequency (Hz) at which the weighting Wh of hand-arm vibration (`vibration_dose.hand_arm_weight`, ISO 5349-1) is
+largest. A probe has many frequencies; its whole acceleration is weighted as if it were at this one, so that the dose is
+never underestimated."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProbeState:
+    """State of the probes and references of a session, as far as they decide what is due next."""
+
+    played: int = 0
+    """Number of probes in the session: with a hand, tests of a free handle, and references."""
+    with_hand: int = 0
+    """Number of probes with the hand on the handle, which determines the level of the next."""
+    open: ProbePlayed | None = None
+    """The probe whose measurement is not in the log: it is playing, or the program ended while it played."""
+    since_s: float | None = None
+    """Seconds since the last probe with a hand in this sitting; None before the first, and after a long pause."""
+    referenced: bool = False
+    """Whether the reference of this sitting, since its last long pause, was played, tried or declined."""
+    hand_mass_kg: float | None = None
+    """Apparent mass of the handle with the hand at the last such probe since a long pause; None where not known."""
+    hand_level_n: float = 0.0
+    """Level (N) of the probe that gave `hand_mass_kg`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """A probe with the hand on the handle is due."""
+
+    level_n: float
+    """Peak of the norm of the force."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A reference is due, with no hand on the handle."""
+
+
+def due_probe(probing: ProbeState, settings: ProbeSettings) -> Probe | None:
+    """The next probe with a hand; None where none is due yet, or the protocol has none. The levels take turns."""
+    if not settings.levels_n or (probing.since_s is not None and probing.since_s < settings.interval_s):
+        return None
+    return Probe(settings.levels_n[probing.with_hand % len(settings.levels_n)])
+
+
+def due_reference(probing: ProbeState, settings: ProbeSettings) -> Reference | None:
+    """The reference, due once in a sitting; only after the first probe with a hand, because a comparison with that
+    probe shows whether the handle is free. None where it was played, declined, or the protocol has none."""
+    due = settings.reference_s > 0 and not probing.referenced and probing.since_s is not None
+    return Reference() if due else None
+
+
+def begin_probe(probing: ProbeState, event: ProbePlayed, settings: ProbeSettings) -> ProbeState:
+    """The state while this probe plays.
+
+    Raises LogContradiction where the protocol has no probes, the force is above its cap, or the number does not follow
+    the last.
+    """
+    hand = event.kind == "hand"
+    highest_n = settings.reference_n if event.kind == "reference" else settings.probe_cap_n
+    if not settings.played:
+        raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol has no probes")
+    if event.level_n > highest_n:
+        raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol allows {highest_n:g} N at most")
+    if event.number != probing.played:
+        raise LogContradiction(f"probe {event.number}, but probe {probing.played} is the next")
+    return replace(
+        probing,
+        played=probing.played + 1,
+        with_hand=probing.with_hand + hand,
+        open=event,
+        since_s=0.0 if hand else probing.since_s,
+        referenced=probing.referenced or not hand,
+    )
+
+
+def end_probe(probing: ProbeState, event: ProbeMeasured) -> ProbeState:
+    """The state after the measurement of a probe, or after a reference that the experimenter declined (it has the next
+    number and no recording). Raises LogContradiction where another probe is playing, or none."""
+    declined = event.number == probing.played and event.recording is None
+    if not declined and (probing.open is None or probing.open.number != event.number):
+        raise LogContradiction(f"a measurement of probe {event.number}, which is not playing")
+    ended = replace(probing, open=None, referenced=probing.referenced or declined)
+    if probing.open is None or probing.open.kind != "hand":
+        return ended
+    return replace(ended, hand_mass_kg=event.apparent_mass_kg, hand_level_n=probing.open.level_n)
+
+
+def after_break(probing: ProbeState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbeState:
+    """The state after a pause or a rest.
+
+    After `reference_after_pause_s` or longer the grip may be another: a probe and a reference are due again. After a
+    shorter pause the interval to the next probe starts anew, because the participant is still finding the grip. A
+    shorter rest changes nothing.
+    """
+    seconds = event.paused_s if isinstance(event, PauseTaken) else event.rested_s
+    if seconds >= settings.reference_after_pause_s:
+        return replace(probing, referenced=False, since_s=None, hand_mass_kg=None)
+    if isinstance(event, RestTaken) or probing.since_s is None:
+        return probing
+    return replace(probing, since_s=0.0)
