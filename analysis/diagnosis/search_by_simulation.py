@@ -72,44 +72,61 @@ def search_by_simulation(
         driven = not fitting.is_reduced and not recordings[0].meta.get("imposed")
         catalogue = [] if named else [e for e in catalogue if _unseen_by_balance(e.name, place_of_effect(e), driven)]
         may_be_named = []
+    impacts = _ImpactSearch(fitting, may_be_named, settings, progress)
     if settings.clean:
         observable = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
         found = _search_with_learned_error(
             recordings, fitting.model, (context, catalogue, observable), settings, progress
         )
     else:
-        found = _search(context, catalogue, settings, progress)
+        found = _search(context, catalogue, settings, progress, impacts)
         if hums_low(found.result.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
-            found = _search(context, catalogue, settings, progress)
+            found = _search(context, catalogue, settings, progress, impacts)
     if balances and found.result.judgement.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
         found = replace(found, result=unname_doubtful_effects(require_enough_gain(found.result, repeats)))
-    return _explain_impacts(found, fitting, may_be_named, settings, progress)
+    return replace(found, result=impacts.at_end(found.result))
 
 
-def _explain_impacts(
-    found: SearchOutcome,
-    fitting: FittingMeasure,
-    may_be_named: Sequence[Effect],
-    settings: DiagnosisSettings,
-    progress: Progress,
-) -> SearchOutcome:
-    """The outcome with play that rattles, compared by band power, where the search leaves something unexplained that
-    this explains; else unchanged."""
-    result = found.result
-    left = result.judgement.verdict in ("unexplained", "partly_explained") and not has_law(result)
-    if not left or result.context.certain or not settings.time_left():
-        return found
-    # Imported here: only a diagnosis that leaves something open looks for impacts.
-    from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
-    from analysis.diagnosis.search.impacts import explain_impacts
+class _ImpactSearch:
+    """The search for play that rattles, compared by band power; made once, early or at the end."""
 
-    progress("looking for play that rattles", 0.9)
-    rattled = explain_impacts(result.context, result.found, fitting.chosen.floors, may_be_named, settings.time_left)
-    if rattled is None:
-        return found
-    return replace(found, result=SearchResult(result.context, rattled, judge(rattled), (IMPACTS_COMPARED,)))
+    def __init__(
+        self, fitting: FittingMeasure, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
+    ) -> None:
+        """catalogue: the effects that may be named."""
+        self._fitting, self._catalogue, self._settings, self._progress = fitting, catalogue, settings, progress
+        self._found: list[SearchResult | None] = []
+
+    def before_thirds(self, seen: SearchResult) -> SearchResult:
+        """The result with play, where two effects leave much of the mismatch and play explains all of it: further ones
+        would take all the time of an irregular response, whose waveform none of them predicts."""
+        if seen.judgement.named or judge(seen.found).verdict != "unexplained" or not self._settings.time_left():
+            return seen
+        rattled = self._look(seen)
+        return rattled if rattled is not None and rattled.judgement.verdict == "explained" else seen
+
+    def at_end(self, seen: SearchResult) -> SearchResult:
+        """The result with play, where the search leaves something open that play explains, in part at least."""
+        left = seen.judgement.verdict in ("unexplained", "partly_explained") and not has_law(seen)
+        if not left or seen.context.certain or not self._settings.time_left():
+            return seen
+        return self._look(seen) or seen
+
+    def _look(self, seen: SearchResult) -> SearchResult | None:
+        if not self._found:
+            # Imported here: only a diagnosis that leaves something open looks for impacts.
+            from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
+            from analysis.diagnosis.search.impacts import explain_impacts
+
+            self._progress("looking for play that rattles", 0.9)
+            floors, time_left = self._fitting.chosen.floors, self._settings.time_left
+            found = explain_impacts(seen.context, seen.found, floors, self._catalogue, time_left)
+            self._found.append(
+                None if found is None else SearchResult(seen.context, found, judge(found), (IMPACTS_COMPARED,))
+            )
+        return self._found[0]
 
 
 def _search_with_learned_error(
@@ -133,15 +150,19 @@ def _search_with_learned_error(
 
 
 def _search(
-    context: SearchContext, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
+    context: SearchContext,
+    catalogue: Sequence[Effect],
+    settings: DiagnosisSettings,
+    progress: Progress,
+    impacts: _ImpactSearch,
 ) -> SearchOutcome:
-    beyond = Beyond()
+    beyond = Beyond(before_thirds=impacts.before_thirds)
     if settings.discovery and not settings.fitted:
         # Imported here: only a diagnosis that looks for laws needs their grammar.
         from analysis.diagnosis.discovery.add_laws import LawSearch
 
         laws = LawSearch(progress, settings.time_left)
-        beyond = Beyond(_unless_hum(laws.add_short), _unless_hum(laws.add_any))
+        beyond = Beyond(_unless_hum(laws.add_short), impacts.before_thirds, _unless_hum(laws.add_any))
     found = search_effects(context, catalogue, progress, settings.time_left, beyond)
     # A model that was fitted to the recordings has no calibration to leave.
     if not settings.fitted:

@@ -93,9 +93,10 @@ class Beyond:
 
     before_pairs: Callable[[SearchResult], SearchResult] = lambda seen: seen
     """Before a second effect is looked for: names only what is a shorter description than two effects."""
+    before_thirds: Callable[[SearchResult], SearchResult] = lambda seen: seen
+    """Before a third effect is looked for: names only what explains all that the catalogue's pairs do not."""
     at_end: Callable[[SearchResult], SearchResult] = lambda seen: seen
-    """After the last effect, with and without the part of the held-out samples that is opened where only they show the
-    mismatch."""
+    """After the last effect; with opened held-out samples, too, where only they show the mismatch."""
 
 
 def search_effects(
@@ -106,7 +107,7 @@ def search_effects(
     beyond: Beyond = Beyond(),
 ) -> SearchResult:
     """The search for effects with its verdict, with the model's own parameters within `Tuning.bound`."""
-    beyond = Beyond(_guarded(beyond.before_pairs), _guarded(beyond.at_end))
+    beyond = Beyond(_guarded(beyond.before_pairs), beyond.before_thirds, _guarded(beyond.at_end))
     alone = add_effects(context, catalogue, begin(context, progress), progress, time_left, most=1)
     early = SearchResult(context, alone, Judgement("unexplained", False))
     if is_worth_searching(context, alone, alone.after) and judge(alone).verdict != "explained":
@@ -114,7 +115,13 @@ def search_effects(
     explains = early.judgement.verdict == "explained"
     if explains and early.found.after.score.worst_channel <= EXPLAINED_ERROR:
         return early
-    result = _search_with_pairs(context, alone, catalogue, progress, time_left, beyond.at_end)
+    # With an effect left out, a round that brought none may not be taken up again.
+    pair = add_effects(context, catalogue, alone, progress, time_left, MOST_EFFECTS if context.barred else 2)
+    pair = exchange_for_relatives(context, pair, catalogue, progress, time_left)
+    rattling = beyond.before_thirds(replace(early, found=pair))
+    if rattling.found is not pair:
+        return rattling
+    result = _search_with_thirds(context, pair, catalogue, progress, time_left, beyond.at_end)
     return _keep_early(early, result)
 
 
@@ -156,19 +163,16 @@ def _guarded(add: Callable[[SearchResult], SearchResult]) -> Callable[[SearchRes
     return lambda seen: seen.context.guard.part(LAW_BEYOND, "its search", lambda: add(seen), seen)
 
 
-def _search_with_pairs(
+def _search_with_thirds(
     context: SearchContext,
-    alone: Explanation,
+    pair: Explanation,
     catalogue: Sequence[Effect],
     progress: Progress,
     time_left: TimeBudget,
     beyond: Callable[[SearchResult], SearchResult],
 ) -> SearchResult:
-    """The search that goes on from a first effect, where that leaves enough. alone: the explanation by it."""
-    # With an effect left out, a round that brought none may not be taken up again.
-    found = add_effects(context, catalogue, alone, progress, time_left, MOST_EFFECTS if context.barred else 2)
-    found = exchange_for_relatives(context, found, catalogue, progress, time_left)
-    found = add_effects(context, catalogue, found, progress, time_left)
+    """The search after two effects, where these leave enough for more. pair: the explanation by them."""
+    found = add_effects(context, catalogue, pair, progress, time_left)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     judged = _judge_with_prediction(context, found)
     first = SearchResult(context, found, judged, _remarks(found))
@@ -244,15 +248,11 @@ def _find_in_parts(
     return opened, False
 
 
-def _known(first: SearchResult) -> FittedCandidate:
-    return first.found.after if first.judgement.named else first.found.retuned
-
-
 def _adds_confirmed(first: SearchResult, opened: SearchResult, parts: int) -> bool:
     """Whether a search with opened samples names all that the first did, and more, which what is still held out
     confirms; or leaves little with a part of that, where the first had taken up too much. parts: as of
     `_find_with_opened`; those finer than halves lie between what was fitted, so that no more than noise may be left."""
-    before, found = _known(first), opened.found
+    before, found = first.found.after if first.judgement.named else first.found.retuned, opened.found
     if parts > HALVES and np.nanmax(found.after.score.test, initial=0.0) > EXPLAINED_ERROR:
         return False
     known, named = _sites(before), _sites(found.after)
