@@ -34,7 +34,7 @@ def searched(recording, with_laws=True):
         said.append(what)
 
     laws = LawSearch(progress, always)
-    beyond = Beyond(laws.add_short, laws.add_any) if with_laws else Beyond()
+    beyond = Beyond(laws.add_short, at_end=laws.add_any) if with_laws else Beyond()
     result = search_effects(arena_of(recording)[0], CATALOGUE, progress, always, beyond)
     return result, said
 
@@ -163,7 +163,7 @@ def test_a_law_search_that_crashes_keeps_what_the_catalogue_names(seed=12):
 
     context, _ = arena_of(recorded((CUBE, DRAG_2), seed))
     guarded = replace(context, guard=Guard(on=True))
-    result = search_effects(guarded, CATALOGUE, lambda what, share: None, always, Beyond(crashes, crashes))
+    result = search_effects(guarded, CATALOGUE, lambda what, share: None, always, Beyond(crashes, at_end=crashes))
     assert names_of(result) == {"hardening_stiffness", "quadratic_damping"}
     (said,) = guarded.guard.sentences
     assert said.startswith("A law outside the catalogue was left out")

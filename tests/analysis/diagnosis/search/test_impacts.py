@@ -22,8 +22,10 @@ from analysis.diagnosis.search.band_power_comparison import comparison_of
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import open_effects
 from analysis.diagnosis.search.impacts import _needs_gap, explain_impacts, is_irregular
+from analysis.diagnosis.search.search import Beyond, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.verdict import judge
+from analysis.diagnosis.search.verdict import Judgement, SearchResult, judge
+from analysis.diagnosis.search_by_simulation import _ImpactSearch
 from equalizer.effects.backlash import EFFECT as PLAY
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.coulomb_friction import EFFECT as DRY
@@ -203,6 +205,44 @@ def test_a_device_that_repeats_is_left_alone(diagnosed):
     rubs = searched(diagnosed, (PlacedEffect(DRY, (0,), {"level": 0.2}),))
     assert not is_irregular(*rubs)
     assert explain_impacts(*rubs, CATALOGUE) is None
+
+
+@pytest.fixture
+def looked(loose, told, monkeypatch):
+    """The search for play with its result given, and the explanations that it was asked beside."""
+    asked = []
+
+    def found(context, explanation, *given):
+        asked.append(explanation)
+        return told
+
+    monkeypatch.setattr("analysis.diagnosis.search.impacts.explain_impacts", found)
+    fitting = SimpleNamespace(chosen=SimpleNamespace(floors=loose[2]))
+    return _ImpactSearch(fitting, CATALOGUE, DiagnosisSettings(), lambda said, share: None), asked
+
+
+def test_play_is_looked_for_before_a_third_effect_and_once(loose, told, looked):
+    context, (impacts, asked) = loose[0], looked
+    few = [EFFECTS["coulomb_friction"], EFFECTS["added_mass"]]
+    thirds = Beyond(before_thirds=impacts.before_thirds)
+    result = search_effects(context, few, lambda said, share: None, beyond=thirds)
+    assert (result.found, result.judgement.verdict) == (told, "explained")
+    assert len(asked) == 1 and len(asked[0].steps) <= 2
+    assert impacts.at_end(SearchResult(context, loose[1], Judgement("unexplained", False))).found is told
+    assert len(asked) == 1
+
+
+def test_play_is_not_looked_for_beside_what_explains_or_is_named_or_without_time(loose, told, looked):
+    context, (impacts, asked) = loose[0], looked
+    for seen in (
+        SearchResult(context, told, Judgement("explained", True)),
+        SearchResult(context, replace(loose[1], after=told.after, statistic=told.statistic), Judgement("", False)),
+    ):
+        assert impacts.before_thirds(seen) is seen
+    late = _ImpactSearch(None, CATALOGUE, DiagnosisSettings(time_left=lambda: False), lambda said, share: None)
+    open_ended = SearchResult(context, loose[1], Judgement("unexplained", False))
+    assert late.before_thirds(open_ended) is open_ended and late.at_end(open_ended) is open_ended
+    assert asked == []
 
 
 def test_without_play_in_the_catalogue_nothing_is_named(loose):
