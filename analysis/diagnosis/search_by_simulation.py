@@ -82,6 +82,7 @@ def search_by_simulation(
         found = _search(context, catalogue, settings, progress, impacts)
         if hums_low(found.result.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
+            impacts = _ImpactSearch(fitting, may_be_named, settings, progress)
             found = _search(context, catalogue, settings, progress, impacts)
     if balances and found.result.judgement.named:
         repeats = all(floor.how == "repeats" for floor in chosen.floors)
@@ -90,19 +91,23 @@ def search_by_simulation(
 
 
 class _ImpactSearch:
-    """The search for play that rattles, compared by band power; made once, early or at the end."""
+    """The search for play that rattles, compared by band power; made once, early or at the end, and again only where
+    the result has more effects by then: these are its rivals."""
 
     def __init__(
         self, fitting: FittingMeasure, catalogue: Sequence[Effect], settings: DiagnosisSettings, progress: Progress
     ) -> None:
         """catalogue: the effects that may be named."""
         self._fitting, self._catalogue, self._settings, self._progress = fitting, catalogue, settings, progress
-        self._found: list[SearchResult | None] = []
+        self._found: SearchResult | None = None
+        self._steps = -1
 
     def before_thirds(self, seen: SearchResult) -> SearchResult:
-        """The result with play, where two effects leave much of the mismatch and play explains all of it: further ones
-        would take all the time of an irregular response, whose waveform none of them predicts."""
-        if seen.judgement.named or judge(seen.found).verdict != "unexplained" or not self._settings.time_left():
+        """The result with play, where periods differ, two effects leave much of the mismatch, and play explains all of
+        it: further effects would take all the time, and none of them predicts the waveform."""
+        repeats = any(floor.how == "repeats" for floor in self._fitting.chosen.floors)
+        left = not seen.judgement.named and judge(seen.found).verdict == "unexplained"
+        if not repeats or not left or hums_low(seen.found) or not self._settings.time_left():
             return seen
         rattled = self._look(seen)
         return rattled if rattled is not None and rattled.judgement.verdict == "explained" else seen
@@ -115,7 +120,7 @@ class _ImpactSearch:
         return self._look(seen) or seen
 
     def _look(self, seen: SearchResult) -> SearchResult | None:
-        if not self._found:
+        if self._steps < 0 or (self._found is not None and len(seen.found.steps) > self._steps):
             # Imported here: only a diagnosis that leaves something open looks for impacts.
             from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
             from analysis.diagnosis.search.impacts import explain_impacts
@@ -123,10 +128,10 @@ class _ImpactSearch:
             self._progress("looking for play that rattles", 0.9)
             floors, time_left = self._fitting.chosen.floors, self._settings.time_left
             found = explain_impacts(seen.context, seen.found, floors, self._catalogue, time_left)
-            self._found.append(
-                None if found is None else SearchResult(seen.context, found, judge(found), (IMPACTS_COMPARED,))
-            )
-        return self._found[0]
+            self._found, self._steps = None, len(seen.found.steps)
+            if found is not None:
+                self._found = SearchResult(seen.context, found, judge(found), (IMPACTS_COMPARED,))
+        return self._found
 
 
 def _search_with_learned_error(

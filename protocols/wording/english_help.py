@@ -21,7 +21,7 @@ HELP: dict[str, str] = {
   about two intervals, press the number of the interval in which it shook.
 - If you are not sure, guess. Many trials are meant to be hard, and no answer can do harm.
 - **p** pauses: the handle stops at once, and this trial comes again afterwards.
-- **r** plays this trial again, for instance when you were disturbed. This works a few times only.
+- **r** plays this trial again, for instance when you were disturbed. This works a few times in each run.
 - **q** pauses too, and offers to leave. What you have answered is kept.
 - **Ctrl+C** takes the force off at once and leaves.
 """,
@@ -46,7 +46,7 @@ HELP: dict[str, str] = {
 # End of a practice
 
 - The practice shows what each vibration feels like. Its answers enter no result.
-- Some vibrations are hard to feel for everyone. The study continues in any case.
+- Some vibrations are hard to tell for everyone. The study continues in any case.
 - **Enter** continues.
 """,
     "help_demo": """\

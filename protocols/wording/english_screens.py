@@ -129,7 +129,7 @@ SCREENS: dict[str, str] = {
     "practice_title": "End of this practice",
     "practice_right": "{right} of the last {asked} answers were right.",
     "practice_enough": "That is enough to go on.",
-    "practice_hard": "Some vibrations are hard to feel for everyone. The study continues in any case.",
+    "practice_hard": "Some vibrations are hard to tell for everyone. The study continues in any case.",
     "enter_goes_on": "Press Enter to go on.",
     "rest_title": "Rest",
     "rest_relax": "Let go of the handle and relax your hand.",

@@ -16,7 +16,8 @@ Theory of operation.
    that is still held out.
 5. Where the catalogue leaves a mismatch, `beyond` is called (laws outside the catalogue, `discovery`): before a second
    effect is looked for, as a law that alone explains is a shorter description than two effects, and at the end. A law
-   that was found early and leaves a part is kept where the rest of the search names nothing.
+   that was found early and leaves a part is kept where the rest of the search names nothing. Before a third effect,
+   play that rattles is looked for (`impacts`): no sum of effects predicts its waveform.
 6. Where that still leaves a mismatch, or needs three effects, and a parameter of the model is at its bound, the search
    is repeated with a wider one (`move_model_further`): a model that was fitted to this device has the missing physics
    as a bias. Its result is taken if it explains what the first does not, or by fewer effects.
@@ -30,7 +31,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, begin, explain, is_worth_searching
@@ -56,7 +56,6 @@ from analysis.diagnosis.search.verdict import (
     MILDER_TEST_USED,
     MODEL_MOVED,
     NOT_SHOWN,
-    ONLY_REFINES,
     TEST_HALF_USED,
     TEST_PARTS_USED,
     Judgement,
@@ -66,6 +65,7 @@ from analysis.diagnosis.search.verdict import (
     is_plainer,
     judge,
     may_move_further,
+    search_remarks,
 )
 from analysis.diagnosis.settings import EXPLAINED_ERROR, MOST_EFFECTS
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -175,7 +175,7 @@ def _search_with_thirds(
     found = add_effects(context, catalogue, pair, progress, time_left)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     judged = _judge_with_prediction(context, found)
-    first = SearchResult(context, found, judged, _remarks(found))
+    first = SearchResult(context, found, judged, search_remarks(found))
     # What fits where it was fitted is kept even if unconfirmed: a second effect may show in the held-out samples alone.
     left = found.after if judged.named or (found.steps and as_good_as_noise(found)) else found.retuned
     if found.ended_early or found.barred or not shows_there_alone(left.score.test, left):
@@ -183,7 +183,8 @@ def _search_with_thirds(
     try:
         opened, adds = _find_in_parts(first, left, catalogue, progress, time_left)
     except OutOfTimeError:
-        return beyond(replace(first, found=replace(found, ended_early=True), remarks=(OUT_OF_TIME, *first.remarks)))
+        ended = replace(first, found=replace(found, ended_early=True), remarks=(OUT_OF_TIME, *first.remarks))
+        return _leave_open(beyond(ended))
     if adds and (judged.named or opened.judgement.verdict == "explained"):
         there = beyond(opened)
         said = tuple(remark for remark in opened.remarks[:1] if remark not in there.remarks)
@@ -206,8 +207,13 @@ def _find_beyond(
     unconfirmed = (*tried.unconfirmed, *there.unconfirmed)
     if there.judgement.named:
         return replace(there, remarks=(*opened.remarks, *there.remarks), unconfirmed=unconfirmed)
-    judged = replace(first.judgement, verdict="unexplained")
-    return replace(tried, judgement=judged, remarks=(NOT_SHOWN, *tried.remarks), unconfirmed=unconfirmed)
+    return _leave_open(replace(tried, unconfirmed=unconfirmed))
+
+
+def _leave_open(result: SearchResult) -> SearchResult:
+    """The result, unexplained where nothing is named: the held-out samples alone show a mismatch."""
+    judged = replace(result.judgement, verdict="unexplained")
+    return result if result.judgement.named else replace(result, judgement=judged, remarks=(NOT_SHOWN, *result.remarks))
 
 
 def _find_with_opened(
@@ -229,7 +235,7 @@ def _find_with_opened(
     found = explain(context, catalogue, progress, time_left, begun)
     found = _exchange_and_prune(context, found, catalogue, progress, time_left)
     used = {0: MILDER_TEST_USED, HALVES: TEST_HALF_USED}.get(parts, TEST_PARTS_USED)
-    return SearchResult(context, found, _judge_with_prediction(context, found), (used, *_remarks(found))), parts
+    return SearchResult(context, found, _judge_with_prediction(context, found), (used, *search_remarks(found))), parts
 
 
 def _find_in_parts(
@@ -242,7 +248,10 @@ def _find_in_parts(
         return opened, True
     no_more = _sites(opened.found.after) <= _sites(first.found.after)
     if parts != FINER_PARTS[-1] and no_more and time_left():
-        finer, parts = _find_with_opened(first, left, catalogue, progress, time_left, FINER_PARTS[-1])
+        try:
+            finer, parts = _find_with_opened(first, left, catalogue, progress, time_left, FINER_PARTS[-1])
+        except OutOfTimeError:
+            return replace(opened, remarks=(*opened.remarks, OUT_OF_TIME)), False
         if _adds_confirmed(first, finer, parts):
             return finer, True
     return opened, False
@@ -281,16 +290,6 @@ def _exchange_and_prune(
     exchanged = exchange_effects(context, found, catalogue, progress, time_left)
     newest = found.steps[-1].newest if found.steps else ""
     return context.guard.part(newest, "its last look", lambda: prune(context, exchanged, time_left), nothing)
-
-
-def _remarks(found: Explanation) -> tuple[str, ...]:
-    early = (OUT_OF_TIME,) if found.ended_early else ()
-    barred = (ONLY_REFINES,) if found.barred else ()
-    undetermined = (
-        f"An explanation by {noun_of(name)} is not named: these recordings leave its parameters as good as open."
-        for name in dict.fromkeys(found.undetermined)
-    )
-    return (*early, *barred, *undetermined)
 
 
 def _judge_with_prediction(context: SearchContext, found: Explanation) -> Judgement:

@@ -7,10 +7,12 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.diagnosis.document import Verdict
+from analysis.diagnosis.effect_words import noun_of
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import leaves_little, share_of_mismatch
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.settings import (
     CONFIRMED_SHARE,
     EXPLAINED_BY_CHANCE,
@@ -101,6 +103,17 @@ def judge(found: Explanation) -> Judgement:
     if as_good_as_noise(found) and not np.nanmax(found.after.score.test, initial=0.0) > HELD_OUT_ERROR:
         return Judgement("explained", True)
     return Judgement("partly_explained", True) if worth_naming(found) else Judgement("unexplained", False)
+
+
+def search_remarks(found: Explanation) -> tuple[str, ...]:
+    """Sentences for the user: what the search did not do, and what it found and does not name."""
+    early = (OUT_OF_TIME,) if found.ended_early else ()
+    barred = (ONLY_REFINES,) if found.barred else ()
+    undetermined = (
+        f"An explanation by {noun_of(name)} is not named: these recordings leave its parameters as good as open."
+        for name in dict.fromkeys(found.undetermined)
+    )
+    return (*early, *barred, *undetermined)
 
 
 def as_good_as_noise(found: Explanation) -> bool:

@@ -181,7 +181,8 @@ def _compensate_command_map(
     if identified_with_n is not None:
         played[:, axis] *= linear_share(law, identified_with_n)
     meant = played[:, axis] + added[:, axis]
-    added[:, axis] += invert_command_map(law, meant) - meant
+    slip_n = SLIP_SHARE * float(np.sqrt(np.mean(meant**2)))
+    added[:, axis] += invert_command_map(law, meant, slip_n) - meant
 
 
 def _compensate_deadband(

@@ -24,8 +24,11 @@ TABLE = 2001
 """Samples of the table by which a command map is inverted."""
 REACH = 2.0
 """Range of that table at first, as a multiple of the largest intended force: enough for gains of 0.5 or more."""
-_MOST_DOUBLINGS = 12
-"""How often the range is doubled where the map does not reach the intended force in it: gains down to 1e-4."""
+_MOST_DOUBLINGS = 3
+"""How often the range is doubled where the map does not reach the intended force in it: gains down to 1/16. A map that
+needs more is near saturation: its commands would use up the cap, and with it the compensation of all other effects."""
+_FLAT = 1e-9
+"""Force within a dead band, relative to the largest force of the table."""
 _SPANS = tuple(10.0**decade for decade in range(5))
 """Ranges of commands, in the command's unit, within which a map is tested for rising."""
 PLAYED = 1000.0
@@ -94,27 +97,41 @@ def linear_share(law: Law, amplitude: float) -> float:
     return float(2 * np.mean(passed * wave) / amplitude)
 
 
-def invert_command_map(law: Law, meant: FloatArray) -> FloatArray:
-    """(N,): the commands that a command map turns into the intended forces `meant` (N,).
+def invert_command_map(law: Law, meant: FloatArray, slip_n: float) -> FloatArray:
+    """(N,): the commands that a command map turns into the intended forces `meant` (N,). slip_n: force below which the
+    command crosses a dead band smoothly, because a command that jumps cannot be played; 0 of an intended force of 0.
 
     By linear interpolation in a table, whose range grows until the map reaches the largest intended force. Where the
     map never does (saturation), the command is that of the nearest force in the first range. Raises ValueError where
     the map falls in the first range.
     """
+    commands, forces = _tabulate_to(law, meant)
+    inverse = np.interp(meant, forces, commands)
+    flat = commands[np.abs(forces) <= _FLAT * np.abs(forces).max()]
+    if len(flat) < 2 or slip_n <= 0:
+        return np.asarray(inverse)
+    # The command at rest is the one nearest to zero; from there to the edge of the dead band as the force rises.
+    rest = float(np.clip(0.0, flat[0], flat[-1]))
+    edge = np.where(meant > 0, flat[-1], flat[0])
+    beyond = np.where(meant == 0, 0.0, inverse - edge)
+    return np.asarray(rest + np.abs(edge - rest) * np.tanh(meant / slip_n) + beyond)
+
+
+def _tabulate_to(law: Law, meant: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The table of the smallest range in which the map reaches the intended forces; the first where none does."""
     span = REACH * max(float(np.abs(meant).max()), np.finfo(np.float64).tiny)
-    first = None
+    first = _tabulate(law, span)
+    if not _is_rising(first[1]):
+        raise ValueError(
+            f"the command map {law.text} falls somewhere, so it has no inverse; leave it out of what is compensated"
+        )
     for doubling in range(_MOST_DOUBLINGS + 1):
         commands, forces = _tabulate(law, span * 2**doubling)
         if not _is_rising(forces):
             break
         if forces[0] <= meant.min() and meant.max() <= forces[-1]:
-            return np.asarray(np.interp(meant, forces, commands))
-        first = first or (commands, forces)
-    if first is None:
-        raise ValueError(
-            f"the command map {law.text} falls somewhere, so it has no inverse; leave it out of what is compensated"
-        )
-    return np.asarray(np.interp(meant, first[1], first[0]))
+            return commands, forces
+    return first
 
 
 def _tabulate(law: Law, span: float) -> tuple[FloatArray, FloatArray]:

@@ -230,6 +230,10 @@ def test_play_is_looked_for_before_a_third_effect_and_once(loose, told, looked):
     assert len(asked) == 1 and len(asked[0].steps) <= 2
     assert impacts.at_end(SearchResult(context, loose[1], Judgement("unexplained", False))).found is told
     assert len(asked) == 1
+    # More effects by then are rivals that were not compared.
+    more = replace(loose[1], steps=(*asked[0].steps, loose[1].after))
+    assert impacts.at_end(SearchResult(context, more, Judgement("unexplained", False))).found is told
+    assert len(asked) == 2
 
 
 def test_play_is_not_looked_for_beside_what_explains_or_is_named_or_without_time(loose, told, looked):
@@ -239,8 +243,11 @@ def test_play_is_not_looked_for_beside_what_explains_or_is_named_or_without_time
         SearchResult(context, replace(loose[1], after=told.after, statistic=told.statistic), Judgement("", False)),
     ):
         assert impacts.before_thirds(seen) is seen
-    late = _ImpactSearch(None, CATALOGUE, DiagnosisSettings(time_left=lambda: False), lambda said, share: None)
+    varied = SimpleNamespace(chosen=SimpleNamespace(floors=()))
+    unrepeated = _ImpactSearch(varied, CATALOGUE, DiagnosisSettings(), lambda said, share: None)
     open_ended = SearchResult(context, loose[1], Judgement("unexplained", False))
+    assert unrepeated.before_thirds(open_ended) is open_ended
+    late = _ImpactSearch(varied, CATALOGUE, DiagnosisSettings(time_left=lambda: False), lambda said, share: None)
     assert late.before_thirds(open_ended) is open_ended and late.at_end(open_ended) is open_ended
     assert asked == []
 

@@ -5,8 +5,13 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
+from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.tuning import tuning_of
 from analysis.diagnosis.search import search
-from analysis.diagnosis.search.time_budget import OUT_OF_TIME, always
+from analysis.diagnosis.search.search_context import SearchContext
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, always
+from analysis.diagnosis.search.verdict import Judgement
+from equalizer.effects.catalogue import EFFECTS
 from study.evaluation.challenge.draw_bank import case_of, draw
 
 SEED, SLOW_SENSOR_AND_HARDENING = 99100, 102
@@ -41,6 +46,20 @@ def test_where_the_time_ends_with_the_opened_part_the_first_alone_is_named_and_t
     verdict, named, remarks = names(case, lambda: not opened)
     assert (verdict, named) == ("partly_explained", {"sensor_lag"})
     assert len(opened) == 1 and OUT_OF_TIME in remarks
+
+
+def test_time_that_ends_there_hides_no_mismatch_of_the_held_out_samples(case, monkeypatch):
+    def ends(*given):
+        raise OutOfTimeError
+
+    monkeypatch.setattr(search, "_find_in_parts", ends)
+    monkeypatch.setattr(search, "_judge_with_prediction", lambda *found: Judgement("no_mismatch", False))
+    measure = measure_of([case.recording], case.model).measure
+    tuning = tuning_of(case.model, case.recording.command.channels)
+    context = SearchContext(measure.shorten(), measure, tuning, map)
+    found = search.search_effects(context, [EFFECTS["sensor_lag"]], lambda what, share: None)
+    assert found.judgement == Judgement("unexplained", False)
+    assert search.NOT_SHOWN in found.remarks and OUT_OF_TIME in found.remarks
 
 
 @pytest.mark.slow

@@ -85,15 +85,38 @@ def test_a_command_map_is_undone():
     assert small[np.abs(PUSHED[:, 1]) < 0.02] == pytest.approx(PUSHED[np.abs(PUSHED[:, 1]) < 0.02, 1], abs=1e-4)
 
 
-@pytest.mark.parametrize(
-    "law", ["0.1*fy", "maximum(fy - 3.0, 0.0) + minimum(fy + 3.0, 0.0)"], ids=["a weak actuator", "a wide dead band"]
-)
-def test_a_command_map_is_inverted_where_it_needs_a_command_far_above_the_force(law):
-    done = compensate(PUSHED, WANTED, MODEL, physics(found(law, "command")), None)
-    commands = done.forces[:, 1]
-    passed = 0.1 * commands if "0.1" in law else np.maximum(commands - 3, 0) + np.minimum(commands + 3, 0)
+def test_a_weak_actuator_gets_a_command_far_above_the_force():
+    done = compensate(PUSHED, WANTED, MODEL, physics(found("0.1*fy", "command")), None)
     assert done.not_used == ()
-    assert passed == pytest.approx(PUSHED[:, 1], abs=0.01)
+    assert 0.1 * done.forces[:, 1] == pytest.approx(PUSHED[:, 1], abs=1e-9)
+
+
+@pytest.mark.parametrize("width", [0.05, 3.0])
+def test_a_dead_band_is_crossed_as_the_catalogues_is(width):
+    law = f"maximum(fy - {width}, 0.0) + minimum(fy + {width}, 0.0)"
+    named = ModelEffect("force_deadband", "y", {"width": width})
+    by_law, by_name = (
+        compensate(PUSHED, WANTED, MODEL, physics(effect), None).forces[:, 1]
+        for effect in (found(law, "command"), named)
+    )
+    assert by_law == pytest.approx(by_name, abs=0.02 * width)
+    assert by_law[0] == by_law[-1] == 0.0
+    assert np.abs(np.diff(by_law)).max() <= 1.1 * np.abs(np.diff(by_name)).max()
+
+
+def test_a_dead_band_on_one_side_is_at_rest_without_force():
+    law = "maximum(fy - 0.2, 0.0) + minimum(fy, 0.0)"
+    commands = compensate(PUSHED, WANTED, MODEL, physics(found(law, "command")), None).forces[:, 1]
+    assert commands[0] == 0.0 and commands.min() == pytest.approx(PUSHED[:, 1].min(), rel=0.01)
+    assert commands.max() == pytest.approx(PUSHED[:, 1].max() + 0.2, rel=0.01)
+
+
+def test_a_map_near_saturation_does_not_use_up_the_cap_of_other_effects():
+    peak = np.abs(PUSHED[:, 1]).max()
+    near = found(f"{peak * 1.0001} * 0.63662 * atan(fy/{peak * 0.63662})", "command")
+    alone = compensate(PUSHED, WANTED, MODEL, physics(near), None, cap_n=3.0)
+    assert alone.share == 1.0
+    assert np.abs(alone.forces[:, 1]).max() <= 2 * peak * (1 + 1e-9)
 
 
 def test_a_force_beyond_saturation_gets_the_smallest_range_of_commands():

@@ -158,7 +158,7 @@ def test_progress_is_reported_once_in_a_run(typed):
 
 
 @pytest.mark.parametrize(
-    ("passed", "words"), [(True, "That is enough to go on."), (False, "hard to feel for everyone")]
+    ("passed", "words"), [(True, "That is enough to go on."), (False, "hard to tell for everyone")]
 )
 def test_the_end_of_a_practice_is_reported_and_read(typed, passed, words):
     typed.type("")

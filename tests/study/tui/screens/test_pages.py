@@ -92,7 +92,7 @@ def test_instructions_tell_practice_resumption_and_other_keys(read):
 def test_a_practice_that_went_badly_is_no_failure(read):
     assert "That is enough to go on." in read(PracticeOverScreen(PracticeResult(True, 8, 10)))[1]
     words = read(PracticeOverScreen(PracticeResult(False, 3, 10)))[1]
-    assert "3 of the last 10 answers were right." in words and "hard to feel for everyone" in words
+    assert "3 of the last 10 answers were right." in words and "hard to tell for everyone" in words
 
 
 def test_the_end_says_what_is_saved_and_why_it_ended(read):
