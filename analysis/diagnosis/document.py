@@ -1,6 +1,8 @@
 """Document of a diagnosis: the content of `diagnosis.json`, format `hapteq-diagnosis`, version 1.
 
-Shares and probabilities are in 0 to 1. Errors are normalised root-mean-square over the channels.
+The data classes define the fields and check that they agree (a verdict with its effects, an effect with the
+vocabulary). Shares and probabilities are from 0 to 1; errors are root mean square over the channels, normalised to the
+signal. The docstrings of the data classes are published as descriptions in the JSON Schema.
 """
 
 import json
@@ -40,6 +42,7 @@ class FoundLaw:
 
     @model_validator(mode="after")
     def _in_the_language(self) -> Self:
+        """Parse the expression in the language of laws; ValueError where it needs other signals than it lists."""
         found = law_of(self.expression, self.acts_on, self.axis)
         if set(found.variables) != set(self.variables):
             needed = ", ".join(found.variables) or "no signals"
@@ -55,9 +58,9 @@ class Mismatch:
     input: str
     band_hz: tuple[float, float]
     amplitude: float | None
-    """Level of the excitation, in the command's unit; null over all levels."""
+    """Level of the excitation, in the unit of the command; null where all levels are taken together."""
     state: str | None
-    """The state that it is tied to, in words ("near v = 0"); null where it is tied to none."""
+    """State of the device in which the mismatch occurs, in words ("near v = 0"); null where it depends on none."""
     share: Share
     p_value: Annotated[float, Field(ge=0, le=1)]
 
@@ -116,6 +119,7 @@ class NamedEffect:
 
     @model_validator(mode="after")
     def _as_in_the_vocabulary(self) -> Self:
+        """ValueError where the effect lacks its law or main parameter, or contradicts its entry in the vocabulary."""
         if self.law is None and self.effect == DISCOVERED_LAW:
             raise ValueError(f"{DISCOVERED_LAW} lacks its law")
         if self.law is not None and self.effect in EFFECTS_BY_NAME:
@@ -138,7 +142,7 @@ class Candidate:
     place: Place
     axis: str | None
     parameters: dict[str, float]
-    """SI"""
+    """Fitted values by the name of the parameter, in SI units."""
     held_out_gain: Annotated[Share, Field(description="Of the error power on data that nothing was fitted to.")]
     share_of_black_box: Annotated[Share, Field(description="Of what all laws together take of the linear error power.")]
     why_not: str
@@ -196,6 +200,7 @@ class Diagnosis:
 
     @model_validator(mode="after")
     def _verdict_fits(self) -> Self:
+        """ValueError where the verdict contradicts the effects, the remainder or the mismatch."""
         named = self.verdict in ("explained", "partly_explained")
         if named != bool(self.effects):
             raise ValueError(
@@ -209,13 +214,13 @@ class Diagnosis:
 
     @property
     def returned_set(self) -> tuple[str, ...]:
-        """The named effects and every rival that these data cannot tell from them."""
+        """Names of the named effects and of every rival that these data cannot distinguish from them."""
         names = [name for effect in self.effects for name in (effect.effect, *_inseparable(effect))]
         return tuple(dict.fromkeys(names))
 
 
 def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Plain values, without format and version."""
+    """The diagnosis as JSON values, without format and version. Empty optional entries are left out."""
     plain: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
     effects, candidates = plain["effects"], plain["candidates"]
     left_out = [(effect, optional) for effect in effects for optional in ("class", "held_out_gain")]
@@ -227,8 +232,8 @@ def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
-    """Parse the document of a diagnosis. document: without format and version. Raises DiagnosisError with every
-    problem, by its place."""
+    """Parse the document of a diagnosis. document: without format and version. Raises DiagnosisError with all problems,
+    each with the path of its entry."""
     try:
         # Through JSON: strict checking then accepts a list for a tuple, but no text for a number.
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
@@ -244,14 +249,16 @@ def diagnosis_schema() -> dict[str, Any]:
 
 
 def _inseparable(effect: NamedEffect) -> tuple[str, ...]:
+    """Names of the rivals that the data cannot distinguish from the effect."""
     return tuple(rival.effect for rival in effect.rivals if rival.inseparable)
 
 
 _PLAIN = {"unexpected_keyword_argument": "this key is not known here", "missing": "this is missing"}
-"""Plain texts in place of pydantic's technical ones, by the type of its error."""
+"""Messages that replace those of pydantic, by pydantic's type of error."""
 
 
 def _sentence(place: tuple[str | int, ...], message: str) -> str:
+    """The message after the path of the entry; without a path for the whole document."""
     where = ".".join(str(part) for part in place)
     plain = message.removeprefix("Value error, ")
     return f"{where}: {plain}" if where else plain

@@ -1,4 +1,8 @@
-"""Figure of delivered acceleration over commanded level, frequency by frequency."""
+"""Figure of measured acceleration against the commanded force level, one panel per frequency, on log-log axes.
+
+It shows whether the device is linear (points along the grey line of proportionality) and how much of its motion is
+perpendicular to the commanded direction.
+"""
 
 from collections.abc import Sequence
 
@@ -22,11 +26,12 @@ from analysis.figures.style import (
 from protocols.trial import Trial
 
 _RASTER_FROM = 400
-"""Number of points from which they are rasterised, because each adds a line of text to the page."""
+"""Largest number of points that are drawn as vectors; more are rasterised, because each adds a line to the SVG."""
 
 
 def draw_delivered(trials: Sequence[Trial]) -> Figure:
-    """Acceleration amplitude along and off the direction against the commanded level, one panel per frequency."""
+    """Figure of acceleration amplitude (m/s²) along and perpendicular to the commanded direction, against the level
+    (N). Trials that do not count or have no measured acceleration are left out; a note where none remains."""
     measured = [trial for trial in trials if trial.counts and trial.delivered_mps2]
     if not measured:
         return draw_no_data_note(new_figure(PAGE_IN, 2.0), "No trial has a measured acceleration.")
@@ -45,10 +50,12 @@ def draw_delivered(trials: Sequence[Trial]) -> Figure:
 
 
 def _draw_frequency(axes: Axes, trials: list[Trial]) -> None:
+    """One panel. The grey line is the median ratio of acceleration along the direction to level, times the level."""
     plain_axes(axes)
     rasterized = len(trials) > _RASTER_FROM
     levels = np.array([trial.level_n for trial in trials])
     along = np.array([trial.delivered_mps2 for trial in trials], dtype=np.float64)
+    # A zero has no place on a logarithmic axis and is left out, like a missing value.
     across = np.array([trial.off_axis_mps2 or np.nan for trial in trials], dtype=np.float64)
     axes.loglog(levels, along, "o", color=BLUE, markersize=3, alpha=0.5, rasterized=rasterized)
     axes.loglog(levels, across, "s", color=VERMILLION, markersize=3, alpha=0.5, rasterized=rasterized,

@@ -1,4 +1,8 @@
-"""Figure of a participant's staircases: level by trial, with every answer, every reversal and the threshold."""
+"""Figure of a participant's staircases: one panel per run, the level (N, logarithmic) over the number of the trial.
+
+Dots and crosses are right and wrong answers, rings are reversals; the threshold averages the levels at the last of
+them (black rings), or is the mean of Psi's posterior. A dashed line is the cap, the highest level allowed.
+"""
 
 from collections.abc import Sequence
 
@@ -25,11 +29,11 @@ from analysis.psychophysics.thresholds import RunEnd, Threshold, threshold_of
 from protocols.definition.staircase_rule import StaircaseRule
 
 _LINE_IN = 2.2
-"""Height of a line of panels."""
+"""Height of a row of panels, in inches."""
 
 
 def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
-    """One panel per run, by frequency. runs: of one participant."""
+    """One panel per run, ordered by frequency; a note where there is no run. runs: of one participant."""
     if not runs:
         return draw_no_data_note(new_figure(PAGE_IN, 2.0), "There is no run to draw.")
     lowest_n = 0.75 * min([trial.staircase_n for run in runs for trial in run.answered], default=rule.start_n)
@@ -45,6 +49,7 @@ def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
 
 
 def _draw_run(axes: Axes, run: Run, rule: StaircaseRule) -> None:
+    """Draw the levels, answers, reversals and threshold of a run; without a threshold where the run is not complete."""
     plain_axes(axes)
     levels = np.array([trial.staircase_n for trial in run.answered])
     numbers = np.arange(1, len(levels) + 1)
@@ -71,12 +76,14 @@ def _draw_run(axes: Axes, run: Run, rule: StaircaseRule) -> None:
 
 
 def _outcome(row: Threshold) -> str:
+    """End of a panel's title: the threshold in N, or why there is none."""
     if row.threshold_n is not None:
         return f": {row.threshold_n:.2f} N{', cut by the cap' if row.censored else ''}"
     return " (stopped by the trial limit)" if row.ended is RunEnd.TRIAL_LIMIT else " (not complete)"
 
 
 def _legend(rule: StaircaseRule) -> list[Line2D]:
+    """Entries of the legend; no reversals where the Psi method chose the levels."""
     return [
         Line2D([], [], marker="o", color=BLUE, markersize=4, linewidth=0, label="right"),
         Line2D([], [], marker="x", color=VERMILLION, linewidth=0, label="wrong"),
@@ -87,6 +94,7 @@ def _legend(rule: StaircaseRule) -> list[Line2D]:
 
 
 def _rings(rule: StaircaseRule) -> list[Line2D]:
+    """Legend entries of averaged and other reversals."""
     return [
         _ring(BLACK, f"reversal, one of the last {rule.averaged_reversals}"),
         _ring(GREY, "reversal, not averaged"),
@@ -94,6 +102,7 @@ def _rings(rule: StaircaseRule) -> list[Line2D]:
 
 
 def _ring(colour: str, label: str) -> Line2D:
+    """Legend entry: an open circle of this colour."""
     return Line2D(
         [], [], marker="o", markersize=8, markerfacecolor="none", markeredgecolor=colour, linewidth=0, label=label
     )

@@ -1,4 +1,8 @@
-"""Individual thresholds and group means by frequency (the published figure 2)."""
+"""Figure of individual thresholds and group means by frequency (the published figure 2).
+
+Thresholds that the cap cut (censored) are hollow with an arrow upwards; runs that the trial limit stopped have no
+threshold and are drawn above the cap.
+"""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,17 +24,18 @@ from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.threshold_table import ThresholdTable
 
 _SPREAD = 0.5
-"""Width taken by the participants of one frequency, in steps between frequencies."""
+"""Width over which the participants' markers are spread at each frequency, in distances between ticks."""
 _LEGEND_LIMIT = 24
-"""Most participants for whom there is a legend."""
+"""Largest number of participants that the legend lists."""
 _STOPPED_AT = 1.07
-"""Height of the row of stopped runs, as a multiple of the cap."""
+"""Height at which stopped runs are drawn, as a multiple of the cap."""
 
 
 def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: float) -> Figure:
-    """Every participant with a line of their own around the tick, the group mean over it.
+    """Draw each participant's thresholds, joined by a line, and the group mean with its comparison interval.
 
-    table: thresholds in newtons. comparisons: of the same table; without intervals plain means are drawn.
+    table: thresholds in newtons. comparisons: of the same table; where it has no intervals, means are drawn without.
+    cap_n: largest force of the study (N), drawn as a line.
     """
     figure = new_figure(PAGE_IN, 4.2)
     if not table.subjects:
@@ -56,7 +61,7 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
 
 def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
     count = len(table.subjects)
-    # Fixed places instead of jitter: the same participant stands at the same place at every frequency.
+    # A fixed offset from the tick instead of random jitter: a participant has the same offset at every frequency.
     places = np.linspace(-_SPREAD / 2, _SPREAD / 2, count) if count > 1 else np.zeros(1)
     for index, row in enumerate(table.values):
         at = np.arange(len(row)) + places[index]
@@ -68,7 +73,8 @@ def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
 
 
 def draw_threshold(axes: Axes, x: float, value: float, participant: int, cut: bool) -> None:
-    """Hollow with an arrow above where the cap cut; marker and colour identify the participant."""
+    """Draw one threshold (N) at the place x of its frequency; hollow with an arrow upwards if the cap cut it.
+    participant: index, which determines marker and colour."""
     colour = participant_colour(participant)
     axes.plot(x, value, participant_marker(participant), color=colour, markersize=6, alpha=0.85,
               markerfacecolor="white" if cut else colour, markeredgecolor=colour if cut else "white",
@@ -80,7 +86,7 @@ def draw_threshold(axes: Axes, x: float, value: float, participant: int, cut: bo
 
 
 def _draw_stopped(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
-    """Hollow and above the cap: a stopped run has no threshold."""
+    """Draw a hollow marker above the cap for each stopped run, which has no threshold."""
     places = np.linspace(-_SPREAD / 2, _SPREAD / 2, max(2, len(table.subjects)))
     for index, row in enumerate(table.stopped):
         for at, stopped in enumerate(row):
@@ -90,6 +96,7 @@ def _draw_stopped(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
 
 
 def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> None:
+    """Draw the mean of each frequency, with its comparison interval where there is one."""
     intervals = {interval.name: interval for interval in comparisons.intervals}
     for at, (name, values) in enumerate(table.groups().items()):
         present = [value for value in values if value is not None]

@@ -1,5 +1,9 @@
-"""Thresholds in every unit that was measured, side by side: commanded force, acceleration, displacement, and above
-detection."""
+"""Figure of direction thresholds over frequency, one panel per unit: commanded force (N), delivered acceleration
+(m/s²), displacement (mm), and dB above the detection threshold.
+
+The shape of the thresholds over frequency differs between the units, because the response of the device varies with
+frequency.
+"""
 
 from collections.abc import Sequence
 
@@ -29,18 +33,19 @@ _LABELS: dict[Quantity, str] = {
     "above_detection_db": "Above detection (dB)",
 }
 _SPREAD = 0.4
-"""Width taken by the participants of one frequency, in steps between frequencies."""
+"""Width over which the participants of one frequency are spread, in steps between frequencies."""
 _MEDIAN_HALF_WIDTH = 0.32
-"""Half-length of the line of a median, in the same steps: a little wider than the participants."""
+"""Half-length of the line of a median, in the same steps: the line is a little wider than the participants."""
 _PANEL_IN, _LEGEND_IN = 2.5, 0.4
 """Height of a row of panels, and of the legend above them (inches)."""
 _ROOM_BELOW, _ROOM_ABOVE = 0.8, 1.35
-"""Limits of a log axis over the smallest and the largest value."""
+"""Lower limit of a log axis over the smallest value, and upper limit over the largest value."""
 
 
 def draw_thresholds_by_unit(tables: Sequence[ThresholdTable]) -> Figure:
-    """One panel per table: participants by colour and marker over frequency, and their median. tables: one per unit,
-    at least one, of the same participants and frequencies, each with a value that `is_drawn`."""
+    """Figure with one panel per table: each participant's thresholds in a colour and marker, and the median per
+    frequency. tables: at least one, one per unit, with the same participants and frequencies, and each with at least
+    one value for which `is_drawn` is true."""
     columns = 2 if len(tables) > 1 else 1
     lines = -(-len(tables) // columns)
     figure = new_figure(PAGE_IN, _PANEL_IN * lines + _LEGEND_IN)
@@ -54,12 +59,14 @@ def draw_thresholds_by_unit(tables: Sequence[ThresholdTable]) -> Figure:
 
 
 def is_drawn(value: float | None, quantity: Quantity) -> bool:
-    """Whether a threshold has a place in its panel. A log axis has no zero, which is what an accelerometer that gives
-    nothing makes of a threshold in m/s²; dB above detection may be negative."""
+    """Whether a threshold can be drawn in its panel. The axes are logarithmic and have no zero, which
+    a threshold in m/s² is where the accelerometer reads nothing; dB above detection are drawn on a linear axis and may
+    be negative."""
     return value is not None and (value > 0 or quantity == "above_detection_db")
 
 
 def _draw_table(axes: Axes, table: ThresholdTable) -> None:
+    """Draw one panel; values that are missing or cannot be drawn are gaps. Medians are those of the drawn values."""
     plain_axes(axes)
     shown = [[value if is_drawn(value, table.quantity) else np.nan for value in row] for row in table.values]
     values = np.array(shown, dtype=float)

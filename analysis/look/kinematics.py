@@ -1,4 +1,9 @@
-"""Consistency of positions, speeds and accelerations of a motion, and lags between channels of the same quantity."""
+"""Consistency of measured positions, velocities and accelerations, and lags between channels of the same quantity.
+
+An acceleration should be the second derivative of the position that was recorded with it. The check differentiates one
+channel by central differences and estimates gain and lag of the other against it over the coherent spectral lines: a
+gain other than 1 indicates a wrong unit or sign, a lag indicates a filter or a delay.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -15,15 +20,17 @@ from equalizer.signals.signal import FloatArray
 
 KINEMATICS, LAGS = "derivatives", "lag between channels"
 _ORDER = {"m": 0, "m/s": 1, "m/s^2": 2, "rad": 0, "rad/s": 1, "rad/s^2": 2}
+"""Order of the time derivative of position or angle, by unit."""
 _WORDS = {1: "the derivative", 2: "the second derivative"}
 LEAST_SHARE = 0.3
-"""Share of a channel's power in coherent lines below which it shows another motion."""
+"""Least coherent share of a channel's power; below it, the channel measures a different motion and is not compared."""
 SAME_SHARE, SAME_SPREAD = 0.8, 0.2
 """Least coherent share, and largest spread of the ratio, of two channels that measure the same quantity."""
 CLOSE, FAR = 0.05, 0.2
-"""Relative error of a factor from which it is reported, and from which it is wrong."""
+"""Deviation of the gain from 1 above which it is reported, and above which it counts as wrong."""
 LATE = 0.6
-"""Samples: a force that is held moves an acceleration by half of one, and so does a difference to the sample before."""
+"""Largest lag (samples) that is not reported: a zero-order hold of the force delays the acceleration by half a sample,
+and a backward difference delays a derivative by as much."""
 _FILTERED = (
     "It is later as well as smaller, as behind a sensor's filter or a flexible part between both: model that, or "
     "compare them below it. A wrong unit or factor would delay nothing."
@@ -34,6 +41,7 @@ _CAUSES = (
     (30 / np.pi, "rpm taken for rad/s"), (25.4, "inches for millimetres"), (1 / 0.0254, "inches for metres"),
     (1 / 0.3048, "feet for metres"), (2.0, "a range or a count that is twice"),
 )  # fmt: skip
+"""Factors of common unit errors, and their descriptions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +61,8 @@ class KinematicPair:
 def find_kinematic_pairs(
     channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
 ) -> tuple[KinematicPair, ...]:
-    """Find, for each speed and acceleration, the channel whose derivative agrees best with it, if any does."""
+    """For each velocity and acceleration, the channel whose derivative has the largest coherent share with it; none
+    where that share is below `LEAST_SHARE`."""
     moving = [
         channel for channel in channels if channel.unit in _ORDER and channel.known.size and np.ptp(channel.known) > 0
     ]
@@ -63,6 +72,7 @@ def find_kinematic_pairs(
 def _best_pair(
     later: Channel, moving: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float
 ) -> KinematicPair | None:
+    """The pair of `later` and the channel among `moving` whose derivative agrees best with it; None where none does."""
     found = []
     for earlier in moving:
         order = _ORDER[later.unit] - _ORDER[earlier.unit]
@@ -76,15 +86,19 @@ def _best_pair(
 def _compare_derivative(
     earlier: Channel, later: Channel, order: int, timing: tuple[Sequence[Stretch], float]
 ) -> GainAndLag | None:
+    """Gain and lag of `later` relative to the derivative of `earlier`. timing: stretches, and sample rate in Hz. None
+    where no stretch is long enough or no line is coherent."""
     stretches, rate_hz = timing
     differentiated = replace(earlier, samples=derivative(earlier.samples, order, rate_hz))
+    # The central difference has no value at the first and the last sample of a stretch.
     inner = [(start + 1, stop - 1) for start, stop in stretches if stop - start > 4]
     spectra = cross_spectra((differentiated, later), inner, rate_hz) if inner else None
     return estimate_gain_and_lag(spectra, 0, 1, _difference_gain(spectra, order, rate_hz)) if spectra else None
 
 
 def derivative(samples: FloatArray, order: int, rate_hz: float) -> FloatArray:
-    """Derivative by central differences, without time shift; NaN at both ends. order: 1 or 2."""
+    """Derivative (n,) of samples (n,) by central differences, which shift nothing in time; NaN at both ends. order: 1
+    or 2."""
     found = np.full(len(samples), np.nan)
     if order == 1:
         found[1:-1] = (samples[2:] - samples[:-2]) * (rate_hz / 2)
@@ -94,18 +108,20 @@ def derivative(samples: FloatArray, order: int, rate_hz: float) -> FloatArray:
 
 
 def _difference_gain(spectra: CrossSpectra, order: int, rate_hz: float) -> FloatArray:
-    """(lines,): gain of central differences relative to the exact derivative."""
+    """(lines,): gain of central differences relative to the exact derivative, with w = 2 pi f / rate: sin(w) / w for
+    the first, (sin(w / 2) / (w / 2))^2 for the second derivative."""
     angle = 2 * np.pi * spectra.frequency_hz / rate_hz
     shrunk = np.sin(angle) / angle if order == 1 else (np.sin(angle / 2) / (angle / 2)) ** 2
     return np.maximum(shrunk, 1e-6)
 
 
 def kinematic_checks(pairs: Sequence[KinematicPair], rate_hz: float) -> tuple[Check, ...]:
-    """A check of each pair, by sign, factor and lag."""
+    """One check of each pair, by the sign of the gain, its size and the lag."""
     return tuple(_pair_check(pair, rate_hz) for pair in pairs)
 
 
 def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
+    """The finding about one pair: the most serious of sign, gain and lag."""
     agreed = pair.agreement
     late = _lag_text(agreed.lag_samples, rate_hz)
     text = (
@@ -116,7 +132,7 @@ def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
     if agreed.gain < 0:
         return Check(KINEMATICS, "wrong", text, f"Turn the sign of one of them{_cause_text(agreed.gain)}.")
     if off > FAR and agreed.gain < 1 and agreed.lag_samples > LATE and not _cause_text(agreed.gain):
-        # A wrong unit or factor delays nothing; what is weaker and later went through a filter or a flexible part.
+        # A wrong unit or factor causes no delay; a gain below 1 with a lag is typical of a filter or a flexible part.
         return Check(KINEMATICS, "notice", text, _FILTERED)
     if off > FAR:
         return Check(KINEMATICS, "wrong", text, f"Check the units and factors of both{_cause_text(agreed.gain)}.")
@@ -128,13 +144,14 @@ def _pair_check(pair: KinematicPair, rate_hz: float) -> Check:
 
 
 def _lag_text(lag: float, rate_hz: float) -> str:
+    """The lag (samples) in ms and samples, for a sentence; empty up to `LATE`."""
     if abs(lag) <= LATE:
         return ""
     return f", {abs(lag) / rate_hz * 1e3:.3g} ms ({abs(lag):.2g} samples) {'later' if lag > 0 else 'earlier'}"
 
 
 def _cause_text(factor: float) -> str:
-    """Known cause of such a factor, as text; empty where there is none."""
+    """Text on the unit error with this factor or its reciprocal, within `CLOSE`; empty where none is known."""
     size = abs(factor)
     for known, words in _CAUSES:
         if min(abs(size / known - 1), abs(size * known - 1)) < CLOSE:
@@ -143,12 +160,14 @@ def _cause_text(factor: float) -> str:
 
 
 def lag_checks(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> tuple[Check, ...]:
-    """Lags of channels that measure the same quantity: a command and its measurement, two sensors of a motion."""
+    """Lags between channels that measure the same quantity, such as a command and its measurement or two sensors of one
+    motion."""
     found = tuple(_lag_pairs(channels, spectra, rate_hz))
     return found or (Check(LAGS, "fine", "No two channels measure the same quantity, so no lag can be measured."),)
 
 
 def _lag_pairs(channels: Sequence[Channel], spectra: CrossSpectra, rate_hz: float) -> Iterator[Check]:
+    """A check for every two channels of the same unit with a nearly constant gain (`SAME_SHARE`, `SAME_SPREAD`)."""
     for each, other in combinations(range(len(channels)), 2):
         first, second = channels[each], channels[other]
         if first.unit != second.unit or {first.role, second.role} == {"command", "excitation"}:

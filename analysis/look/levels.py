@@ -1,4 +1,8 @@
-"""Level of commands and responses in each segment, and whether responses grow in proportion."""
+"""Rms level of commands and responses in each segment, and a check of their proportionality.
+
+In a linear device the response grows in proportion to the command. A gain that differs between the weakest and the
+strongest segment indicates a nonlinearity (friction, end stops, hardening, saturation), or noise.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,14 +16,14 @@ from equalizer.signals.recording import Recording, Segment
 
 LEVELS = "levels"
 _APART = 1.5
-"""Strongest over weakest command from which levels can be compared."""
+"""Least ratio of the strongest to the weakest command for which gains are compared."""
 EVEN, UNEVEN = 0.05, 0.3
-"""Relative change of response over command from which it is reported, and from which it is called large."""
+"""Relative change of the gain (rms of response over rms of command) above which it is reported, and called large."""
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentLevel:
-    """A segment with its times and the rms of every channel in it."""
+    """A segment with its start and duration (s) and the rms of every channel in it."""
 
     number: int
     """Number of the segment from 1; 0 for a recording without segments."""
@@ -28,8 +32,9 @@ class SegmentLevel:
     start_s: float
     duration_s: float
     period: int
+    """Samples per period; 0 = not periodic."""
     rms: tuple[float, ...]
-    """About the mean, per channel."""
+    """Rms about the mean of each channel, in the channel's unit."""
 
 
 def segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[SegmentLevel, ...]:
@@ -51,18 +56,21 @@ def segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[S
 
 
 def _known_samples(channel: Channel, segment: Segment) -> np.ndarray:
+    """Finite samples of the channel in the segment."""
     piece = channel.samples[segment.start : segment.stop]
     return np.asarray(piece[np.isfinite(piece)])
 
 
 def level_checks(levels: Sequence[SegmentLevel], channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Proportionality of each response, over segments of the most frequent kind with the same active commands."""
+    """Check the proportionality of each response over segments of the most frequent kind, for each set of active
+    commands. Empty where commands differ in unit, or no segment is excited."""
     commands = [k for k, channel in enumerate(channels) if channel.role == "command"]
     kinds = [level.kind for level in levels if level.kind not in ("rest", "free")]
     if not kinds or len({channels[k].unit for k in commands}) > 1:
         return ()
     usual = max(set(kinds), key=kinds.count)
     rows = [(_command_level(level, commands), level) for level in levels if level.kind == usual]
+    # Different axes may have different gains: only segments that drive the same axes are compared.
     groups = {_active_commands(level, commands) for _, level in rows}
     found = []
     for group in groups:
@@ -73,15 +81,21 @@ def level_checks(levels: Sequence[SegmentLevel], channels: Sequence[Channel]) ->
 
 
 def _command_level(level: SegmentLevel, commands: Sequence[int]) -> float:
+    """Root of the sum of squares of the commands' rms."""
     return float(np.hypot.reduce([level.rms[k] for k in commands]))
 
 
 def _active_commands(level: SegmentLevel, commands: Sequence[int]) -> tuple[bool, ...]:
+    """Whether each command exceeds a tenth of the strongest in this segment."""
     strongest = max(level.rms[k] for k in commands)
     return tuple(level.rms[k] > 0.1 * strongest for k in commands)
 
 
 def _proportion_check(alike: Sequence[tuple[float, SegmentLevel]], response: int, channel: Channel) -> Check | None:
+    """Compare the gains of one response in the weakest and the strongest segment; None where it does not move.
+
+    alike: (rms of the command, segment) of comparable segments. response: index of the channel.
+    """
     ordered = sorted(alike, key=lambda row: row[0])
     weakest, strongest = ordered[0], ordered[-1]
     if weakest[1].rms[response] == 0 or strongest[1].rms[response] == 0:

@@ -1,4 +1,9 @@
-"""Overview of a recording before any model: its channels, spectra, levels and all checks."""
+"""Overview of a recording before any model is fitted: its channels, spectra and levels, and all checks of its quality.
+
+The checks find missing samples, constant or copied channels, clock errors, wrong units, inconsistent kinematics,
+clipping, coarse quantization, offsets, axes without excitation, low coherence and poor repeatability; each gives a
+sentence, and what to do.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,20 +35,24 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.summary import Summarised, Summary
 
 RESOLUTION = "resolution"
+"""Name of the check of quantization."""
 COARSE, ROUGH, UNSEEN = 3.0, 30.0, 1000.0
-"""A channel's rms in steps of rounding: below the first, rounding hides the motion; below the second it is visible;
-above the last it is not reported."""
+"""Limits of a channel's rms over its quantization step. Below the first, the check is "wrong", because quantization
+hides the motion; below the second, it is a notice; from the last on, nothing is reported."""
 _SENSORS = ("response", "position")
+"""Roles of channels that are measured."""
 
 
 def check_resolution(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Check the resolution of sensors; a command may have few values."""
+    """Check the quantization of sensor channels, one check per channel with a step that matters, else a single one.
+    Commands are left out: they may have few values by design."""
     found = [_resolution_check(channel) for channel in channels if channel.role in _SENSORS]
     known = tuple(check for check in found if check is not None)
     return known or (Check(RESOLUTION, "fine", "No step of a converter matters in any sensor."),)
 
 
 def _resolution_check(channel: Channel) -> Check | None:
+    """Check of one channel; None where it has no quantization step, or one below a thousandth of its rms."""
     step = rounding_step(channel.samples)
     steps = rms(channel.known) / step if step else UNSEEN
     if steps >= UNSEEN:
@@ -70,8 +79,9 @@ class ChannelSummary:
     highest: float
     mean: float
     rms: float
-    """About the mean."""
+    """Rms about the mean."""
     missing: int
+    """Number of samples without a value."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
@@ -85,15 +95,16 @@ class Overview(Summarised):
     summaries: tuple[ChannelSummary, ...]
     levels: tuple[SegmentLevel, ...]
     spectra: CrossSpectra | None
-    """None where no stretch is long enough, or whole."""
+    """Cross spectra of all channels; None where no stretch without gaps is long enough."""
     bands: tuple[DrivenBand, ...]
     coherences: tuple[ResponseCoherence, ...]
     pairs: tuple[KinematicPair, ...]
     repeats: Repeats
     checks: tuple[Check, ...]
-    """Wrong ones first, then what should be noticed, then what is fine."""
+    """All checks, sorted by level: "wrong", then "notice", then "fine"."""
 
     def summary(self) -> Summary:
+        """Range and rms of each channel, and all checks that are not fine."""
         noticed = [check for check in self.checks if check.level != "fine"]
         return Summary(
             f"{self.name}: {len(self.channels)} channels",
@@ -111,7 +122,7 @@ class Overview(Summarised):
 
 
 def overview(name: str, recording: Recording) -> Overview:
-    """Channels, spectra, levels and checks of a recording. name: of the file, for tables and figures."""
+    """Channels, spectra, levels and checks of a recording. name: name of the file, for tables and figures."""
     channels, stretches, rate_hz = channels_of(recording), parts_of(recording), recording.sample_rate_hz
     spectra = cross_spectra(channels, stretches, rate_hz)
     bands = find_driven_bands(spectra, channels) if spectra else ()
@@ -152,18 +163,21 @@ def overview(name: str, recording: Recording) -> Overview:
 
 
 def _worst_first(checks: tuple[Check, ...]) -> tuple[Check, ...]:
+    """The checks sorted by level; those of one level keep their order."""
     severity = ("wrong", "notice", "fine")
     return tuple(sorted(checks, key=lambda check: severity.index(check.level)))
 
 
 def _count_in_samples(check: Check) -> Check:
-    """A check of a recording without known time, in samples; the check of the clock stays as it is."""
+    """The check with times given in samples, for a recording whose sample rate is not known; the check of the clock is
+    unchanged."""
     if check.name == CLOCK:
         return check
     return replace(check, seen=write_without_time(check.seen), do=write_without_time(check.do))
 
 
 def _summarise_channel(channel: Channel) -> ChannelSummary:
+    """Summary of the known samples; NaN where there are none."""
     known = channel.known if channel.known.size else np.array([np.nan])
     return ChannelSummary(
         channel.role,

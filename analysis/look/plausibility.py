@@ -1,4 +1,9 @@
-"""Plausibility of values in their units: impossible sizes, an accelerometer in g, static offsets."""
+"""Plausibility of the values of channels in their stated units: impossible magnitudes, acceleration in g, static
+offsets.
+
+A wrong unit in an import map scales all identified masses, dampings and stiffnesses; an offset violates the linear
+model. The limits are chosen by hand, far beyond what haptic devices and common test rigs reach.
+"""
 
 from collections.abc import Sequence
 
@@ -13,15 +18,15 @@ _LARGEST = {
     "N": 1e7, "N m": 1e7, "m": 1e3, "m/s": 1e3, "m/s^2": 1e5, "rad/s": 1e5, "rad/s^2": 1e8, "V": 1e4, "A": 1e4,
     "K": 2e3, "Pa": 1e10,
 }  # fmt: skip
-"""Peaks beyond which a unit is doubted."""
+"""Peak magnitude, by unit, above which the unit is doubted."""
 _SMALLEST = {
     "N": 1e-7, "N m": 1e-9, "m": 1e-9, "m/s": 1e-8, "m/s^2": 1e-5, "rad": 1e-8, "rad/s": 1e-7, "V": 1e-8, "A": 1e-8,
 }  # fmt: skip
-"""Rms below which a unit is doubted."""
+"""Rms about the mean, by unit, below which the unit is doubted."""
 G, IN_G = 9.80665, (0.97, 1.03)
-"""Standard gravity in m/s², and the range of a mean reading that looks as if it were in units of it."""
+"""Standard gravity (m/s²), and the range of a mean reading in m/s² that suggests a value in multiples of gravity."""
 STRONG = 0.5
-"""Mean over rms from which an offset is reported."""
+"""Least ratio of the mean's magnitude to the rms about it for which an offset is reported."""
 
 
 def check_units(channels: Sequence[Channel]) -> tuple[Check, ...]:
@@ -31,6 +36,7 @@ def check_units(channels: Sequence[Channel]) -> tuple[Check, ...]:
 
 
 def _unit_check(channel: Channel) -> Check | None:
+    """The doubt about one channel's unit: unstated, too large, too small, or an acceleration in g; None without one."""
     known = channel.known
     if not known.size:
         return None
@@ -54,11 +60,12 @@ def _unit_check(channel: Channel) -> Check | None:
 
 
 def _doubt_unit(channel: Channel, text: str) -> Check:
+    """A check that calls the unit wrong. text: the sentence that says why."""
     return Check(UNITS, "wrong", text, f"Check the unit of {channel.label} in the map.")
 
 
 def check_offsets(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Check static offsets, except of positions and conditions, which may have any."""
+    """Check commands and responses for static offsets; positions, velocities and conditions are exempt."""
     found = tuple(
         check
         for channel in channels
@@ -69,6 +76,7 @@ def check_offsets(channels: Sequence[Channel]) -> tuple[Check, ...]:
 
 
 def _offset_check(channel: Channel) -> Check | None:
+    """The offset of one channel; None where it is below `STRONG` times the rms, or the channel is constant."""
     known = channel.known
     moves = rms(known)
     if not known.size or moves == 0 or abs(float(known.mean())) < STRONG * moves:

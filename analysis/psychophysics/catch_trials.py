@@ -1,7 +1,7 @@
-"""Catch trials: trials at full level within the test runs, where a wrong answer is likely a lapse of attention.
+"""Lapse rate from catch trials: trials at full level within the test runs, where a wrong answer is likely a lapse.
 
-Likely, not surely: at high frequencies even the full level may have no direction for a hand, and a wrong answer
-there is no proof of inattention.
+A wrong answer is no proof of inattention: at high frequencies a person may not perceive a direction even at full level.
+The rate per participant and frequency is wrong over answered trials, with Wilson's 95 % interval.
 """
 
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 from protocols.trial import Phase, Trial
 
 CONFIDENCE = 0.95
-"""Confidence of the interval of the lapse rate."""
+"""Confidence level of the interval of the lapse rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,16 +22,19 @@ class CatchTally:
     subject: str
     frequency_hz: float
     given: int
-    """Answered and counted; always above 0."""
+    """Number of answered catch trials that count; always above 0."""
     wrong: int
+    """Number of wrong answers among them."""
     lapse_rate: float
+    """wrong / given, 0 to 1."""
     lower: float
     upper: float
-    """Wilson's interval of the rate."""
+    """Limits of Wilson's 95 % interval of the lapse rate."""
 
 
 def catch_tallies(trials: Iterable[Trial]) -> tuple[CatchTally, ...]:
-    """One per participant and frequency, over all sessions: participants as they occur, frequencies ascending."""
+    """A tally per participant and frequency, over all sessions: participants in the order of their first trial,
+    frequencies ascending."""
     answers: dict[str, dict[float, list[bool]]] = {}
     for trial in trials:
         if trial.phase is Phase.CATCH and trial.counts:
@@ -44,10 +47,12 @@ def catch_tallies(trials: Iterable[Trial]) -> tuple[CatchTally, ...]:
 
 
 def wilson_interval(wrong: int, given: int) -> tuple[float, float]:
-    """Wilson interval of a rate. Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212."""
+    """Wilson score interval of the rate wrong / given; given >= 1. Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927),
+    209-212."""
     interval = binomtest(wrong, given).proportion_ci(CONFIDENCE, method="wilson")
     return float(interval.low), float(interval.high)
 
 
 def _tally(subject: str, frequency_hz: float, wrong: int, given: int) -> CatchTally:
+    """Tally from the numbers of wrong and of all answers."""
     return CatchTally(subject, frequency_hz, given, wrong, wrong / given, *wilson_interval(wrong, given))

@@ -1,7 +1,10 @@
 """Multiple comparisons: Tukey-Kramer pairs, and the comparison intervals that MATLAB's multcompare draws.
 
-Two groups differ when their comparison intervals are disjoint: exactly for equal sizes (Tukey), approximately for
-unequal ones. The intervals are NOT confidence intervals of the means.
+With q the upper quantile of the studentized range for k groups and the degrees of freedom within groups, the
+difference of two means has the simultaneous interval (m_j - m_i) ± q sqrt(MS_within / 2 (1 / n_i + 1 / n_j)).
+
+Two groups differ significantly when their comparison intervals are disjoint: exactly for equal sizes (Tukey),
+approximately for unequal ones. The intervals are NOT confidence intervals of the means.
 
 Source: Y. Hochberg, A. C. Tamhane, Multiple Comparison Procedures (1987), equation 3.32; C. Y. Kramer,
 Biometrics 12 (1956), 307-310.
@@ -20,7 +23,8 @@ from analysis.psychophysics.anova import GroupSummary, OneWayAnova
 
 @dataclass(frozen=True, slots=True)
 class PairDifference:
-    """Difference of two group means, its simultaneous confidence interval and p-value (Tukey-Kramer)."""
+    """Difference of two group means, its simultaneous confidence interval and p-value (Tukey-Kramer). Means, limits and
+    differences have the unit of the compared values."""
 
     first: str
     second: str
@@ -46,16 +50,18 @@ class Comparisons:
     """Multiple comparisons of group means: every pair, and a comparison interval for each group."""
 
     confidence: float
-    """Simultaneous, over all pairs."""
+    """Simultaneous confidence level over all pairs, 0 to 1."""
     critical_range: float | None
-    """Quantile of the studentized range."""
+    """Quantile of the studentized range; None where nothing can be compared."""
     pairs: tuple[PairDifference, ...]
     intervals: tuple[ComparisonInterval, ...]
     notes: tuple[str, ...]
+    """Reason, in words, where nothing can be compared."""
 
 
 def compare_all(anova: OneWayAnova, confidence: float = 0.95) -> Comparisons:
-    """All pairs of the groups of an ANOVA, and one comparison interval per group that has a value."""
+    """All pairs of the groups of an ANOVA, and a comparison interval for each group that has a value. Without a spread
+    within groups the result is empty and its notes say so."""
     if anova.mean_square_within is None or anova.df_within is None:
         return Comparisons(confidence, None, (), (), ("Without a spread within groups no pairs can be compared.",))
     groups = [group for group in anova.groups if group.n > 0]
@@ -65,7 +71,8 @@ def compare_all(anova: OneWayAnova, confidence: float = 0.95) -> Comparisons:
 def tukey_kramer(
     groups: Sequence[GroupSummary], mean_square_within: float, df_within: int, confidence: float = 0.95
 ) -> Comparisons:
-    """Every group must have a mean; two groups at least. mean_square_within, df_within: of the error term."""
+    """Tukey-Kramer intervals and p-values of all pairs. mean_square_within, df_within: of the error term of the ANOVA.
+    Raises ValueError unless there are at least two groups, all with a mean."""
     means = [group.mean for group in groups if group.mean is not None]
     if len(means) != len(groups) or len(groups) < 2:
         raise ValueError(f"a comparison needs two or more groups that all have a mean; got {len(means)}")
@@ -98,10 +105,11 @@ def tukey_kramer(
 
 
 def comparison_half_widths(sizes: Sequence[int], mean_square_within: float, critical_range: float) -> tuple[float, ...]:
-    """Half-width of the comparison interval of each of k >= 2 groups, from their sizes alone.
+    """Half-width (q / sqrt(2)) w_i of the comparison interval of each of k >= 2 groups with the sizes n_i.
 
-    Equal sizes n: q s / (2 sqrt(n)). Unequal: the widths w_i whose sums w_i + w_j best stand for the standard
-    deviations d_ij of the differences.
+    The w_i are least-squares solutions of w_i + w_j = d_ij, the standard deviations of the differences of means:
+    w_i = ((k - 1) sum_j d_ij - sum of d over all pairs) / ((k - 1) (k - 2)), and d_12 / 2 for k = 2. For equal sizes n
+    and s^2 = mean_square_within, the half-width is q s / (2 sqrt(n)).
     """
     k = len(sizes)
     variances = mean_square_within / np.asarray(sizes, dtype=np.float64)

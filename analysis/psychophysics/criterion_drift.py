@@ -1,11 +1,12 @@
-"""Change of a response bias during a session: a straight line through the criteria of its runs, and its test.
+"""Drift of the response criterion during a session: weighted linear regression over its runs, and test of its slope.
 
 Each criterion has the variance of two binomial z scores (N. A. Macmillan, C. D. Creelman, Detection Theory: A User's
-Guide, 2nd ed. (2005), chapter 13). Criteria differ between runs by more than that, without any order, so variances are
-multiplied by a dispersion, at least 1: chi squared about the line over its degrees of freedom (P. McCullagh, J. A.
-Nelder, Generalized Linear Models, 2nd ed. (1989), section 4.5). Five runs leave 3 degrees of freedom, too few to tell
-much, so a session's dispersion is moderated by that of all sessions of the study (G. K. Smyth, Stat. Appl. Genet. Mol.
-Biol. 3 (2004), article 3). Where it is above 1 it is an estimate, and the test Student's.
+Guide, 2nd ed. (2005), chapter 13); its inverse is the weight. Criteria of different runs scatter by more than that
+without any trend, so variances are multiplied by a dispersion, at least 1: chi squared about the line over its degrees
+of freedom nu (P. McCullagh, J. A. Nelder, Generalized Linear Models, 2nd ed. (1989), section 4.5). Five runs leave
+nu = 3, too few for a precise estimate. A session's dispersion is therefore moderated by the dispersion s0 of all
+sessions of the study, with d0 prior degrees of freedom (G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004), article
+3): (chi squared + d0 s0) / (nu + d0). Above 1 it is an estimate, and the slope is tested by Student's t; else by z.
 """
 
 import math
@@ -20,32 +21,32 @@ from analysis.psychophysics.bias import criterion_variance, response_bias
 
 @dataclass(frozen=True, slots=True)
 class CriterionDrift:
-    """Change of the criterion during a session."""
+    """Linear change of the criterion c during a session."""
 
     per_100_trials: float
-    """Of c, in units of d'."""
+    """Change of c in 100 trials, in units of d'."""
     p: float
-    """Two-sided, against no drift."""
+    """Two-sided p value of the slope, against no drift."""
     p_without_a_run: float
-    """The largest p that leaving out a single run gives: one odd run is no drift."""
+    """The largest p value with a single run left out: one unusual run is no drift."""
 
 
 FEWEST_RUNS = 4
-"""Without one of them, three must still show it: two criteria differ, but do not drift."""
+"""Fewest runs with a criterion. With one left out (`p_without_a_run`), three remain; two would always fit a line."""
 SHARED_FREEDOM = 6
-"""Degrees of freedom with which the dispersion of all sessions counts beside a session's own (the d0 of Smyth, chosen
-by hand; of five runs a session has 3)."""
+"""Prior degrees of freedom of the dispersion of all sessions (d0 of Smyth), chosen by hand. A session of five runs has
+3 of its own."""
 
 _Point = tuple[float, float, float]
-"""Of a run: trials before its middle, criterion, and weight, which is one over its binomial variance."""
+"""A run: number of trials before its middle, criterion, and weight (one over the criterion's binomial variance)."""
 _Run = tuple[Sequence[int], Sequence[bool]]
-"""As for `response_bias`."""
+"""A run's directions shown (1 or 2) and whether each answer was right, as for `response_bias`."""
 
 
 def criterion_drifts(sessions: Sequence[Sequence[_Run]]) -> tuple[CriterionDrift | None, ...]:
-    """Drift of the response criterion by session: weighted regression of the criteria of its runs on the number of
-    trials before their middles. sessions: of one study, each with its runs in their order. None with fewer than
-    `FEWEST_RUNS` that have both directions.
+    """Drift of the response criterion, per session: weighted regression of the criteria of its runs on the number of
+    trials before their middles. sessions: of one study, each with its runs in order. None for a session with fewer than
+    `FEWEST_RUNS` runs in which both directions were shown.
     """
     lines = [_line(runs) for runs in sessions]
     fits = [_fit(points) for points in lines if points is not None]
@@ -60,12 +61,13 @@ class _Fit:
 
     slope: float
     z: float
-    """Slope over its standard error, where all variance is binomial."""
+    """Slope over its standard error, if all variance were binomial (dispersion 1)."""
     chi_squared: float
     freedom: int
 
 
 def _line(runs: Sequence[_Run]) -> list[_Point] | None:
+    """Points of the regression; None with fewer than `FEWEST_RUNS`."""
     points, before = list[_Point](), 0
     for shown, correct in runs:
         if (bias := response_bias(shown, correct)) is not None:
@@ -75,6 +77,7 @@ def _line(runs: Sequence[_Run]) -> list[_Point] | None:
 
 
 def _fit(points: Sequence[_Point]) -> _Fit:
+    """Weighted least squares of the criteria on the number of trials."""
     weight = sum(w for _, _, w in points)
     middle = sum(w * place for place, _, w in points) / weight
     mean = sum(w * criterion for _, criterion, w in points) / weight
@@ -85,11 +88,11 @@ def _fit(points: Sequence[_Point]) -> _Fit:
 
 
 def _drift(points: Sequence[_Point], shared: float, all_freedom: int) -> CriterionDrift:
-    """shared: dispersion of all sessions, all_freedom: its degrees of freedom."""
+    """Slope of a session and its tests. shared: dispersion of all sessions; all_freedom: its degrees of freedom."""
     fit = _fit(points)
     freedom = fit.freedom + SHARED_FREEDOM
     dispersion = (fit.chi_squared + SHARED_FREEDOM * shared) / freedom
-    # A session alone shares its own dispersion, which has no more degrees of freedom than that.
+    # In a study of one session the shared dispersion is its own: it adds no degrees of freedom.
     freedom = min(freedom, all_freedom)
     others = [_fit([*points[:left], *points[left + 1 :]]).z for left in range(len(points))]
     return CriterionDrift(
@@ -98,15 +101,16 @@ def _drift(points: Sequence[_Point], shared: float, all_freedom: int) -> Criteri
 
 
 def _p(z: float, dispersion: float, freedom: int) -> float:
-    """Two-sided; a dispersion of 1 or less counts as 1, which is no estimate. Not continuous there: Student's test
-    throughout would name far fewer of the drifts (docs/statistics.md)."""
+    """Two-sided p value. A dispersion of 1 or less counts as 1, a known value: normal test; above 1 it is estimated:
+    Student's test. The p value jumps at 1. Student's test throughout would be continuous, but would detect far fewer
+    drifts (docs/statistics.md)."""
     if dispersion <= 1.0:
         return 2.0 * NormalDist().cdf(-abs(z))
     return float(2.0 * student.sf(abs(z) / math.sqrt(dispersion), freedom))
 
 
 def _criterion_variance(directions_shown: Sequence[int], correct: Sequence[bool]) -> float:
-    """Variance of a run's criterion, computed at its share of right answers for both directions, as without a bias: at
-    the rates of the run itself, runs with a strong bias would count for little."""
+    """Variance of a run's criterion, computed for both directions at the run's overall share of right answers, as if
+    there were no bias. With the rates of each direction, runs with a strong bias would get little weight."""
     first = sum(shown == 1 for shown in directions_shown)
     return criterion_variance(sum(correct), first, len(directions_shown) - first)

@@ -1,11 +1,13 @@
-"""Acceleration ellipsoids: how much of a motion follows the direction of the force.
+"""Acceleration ellipsoids: how much of the handle's motion follows the direction of the commanded force (figure 3 of
+Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices).
 
-Two definitions of the same picture, from a sinusoid of constant amplitude along a test direction:
+Two definitions, both for a sinusoidal force of constant amplitude along a test direction:
 
-* second moments, as published: the mean of the squared accelerations in the frame of the test direction. Noise,
-  hum and harmonics all count as motion, so a noisy sensor rounds the ellipsoid.
-* phasors: the ellipse that the acceleration traces at the driven frequency alone, by lock-in. Noise averages out,
-  harmonics are distinguished, and a phase between the axes shows as a width of the ellipse.
+* second moments, as published: S = mean of a a' (3 x 3) over whole periods, with a the acceleration without its mean;
+  the semi-axes are the square roots of its eigenvalues. Noise, hum and harmonics all count as motion, so a noisy sensor
+  makes the ellipsoid rounder.
+* phasors: the ellipse that Re(p exp(i phi)) traces, with p (3,) the acceleration's phasor at the driven frequency, by
+  lock-in. Noise averages out, harmonics are excluded, and a phase difference between axes widens the ellipse.
 
 Frame: first axis = test direction; third = the device axis most nearly perpendicular to it, made perpendicular;
 second = third x first. For a direction in a plane of device axes the first two axes span that plane.
@@ -23,23 +25,24 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
 HARMONICS = 5
-"""Harmonics looked at, the fundamental included, as far as they lie below half the sample rate."""
+"""Largest number of harmonics that are fitted, the fundamental included; only those below half the sample rate are."""
 ORTHONORMAL = 1e-3
-"""Largest error of the products of a rotation's rows: of angles written with three digits. By hand."""
+"""Largest error of a rotation's R R' against the identity: allows entries written with three digits. By hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class MomentEllipsoid:
-    """The published definition."""
+    """Ellipsoid by second moments of the acceleration: the published definition."""
 
     mean_square: tuple[tuple[float, ...], ...]
     """(3, 3) in (m/s^2)^2, in the frame of the test direction; its diagonal is the mean squared acceleration."""
     semi_axes_mps2: tuple[float, float, float]
-    """Root mean square along the principal axes, largest first."""
+    """Root mean square acceleration along the principal axes, largest first."""
     tilt_deg: float
-    """Angle of the largest axis from the test direction, 0 to 90."""
+    """Angle of the largest principal axis from the test direction, 0 to 90 degrees."""
     turn_deg: float
-    """The same in the plane of the first two axes of the frame, with sign, -90 to 90: for drawing."""
+    """Signed angle of the largest principal axis, projected on the first two axes of the frame, -90 to 90 degrees: for
+    drawing."""
 
     @property
     def normalised_axes(self) -> tuple[float, float]:
@@ -49,29 +52,33 @@ class MomentEllipsoid:
 
 @dataclass(frozen=True, slots=True)
 class PhasorEllipse:
-    """The motion at the driven frequency alone."""
+    """Ellipse of the acceleration at the driven frequency alone. Angles are those of its larger axis, as in
+    `MomentEllipsoid`."""
 
     semi_axes_mps2: tuple[float, float]
-    """Amplitudes along the ellipse's two axes, larger first."""
+    """Amplitudes along the two axes of the ellipse, larger first."""
     tilt_deg: float
     turn_deg: float
     ellipticity: float
-    """Smaller over larger axis: 0 a straight line, 1 a circle."""
+    """Smaller over larger axis: 0 for a straight line, 1 for a circle."""
     on_axis_mps2: float
     """Amplitude along the test direction."""
     off_axis_ratio: float | None
-    """Amplitude perpendicular to the test direction over amplitude along it; None if there is none along."""
+    """Amplitude perpendicular to the test direction over that along it; None if the latter is 0. The perpendicular
+    amplitude is the root sum of squares of both axes."""
     harmonic_share: float
-    """Energy of the harmonics 2 to 5 over that of the fundamental."""
+    """Squared amplitudes of harmonics 2 to `HARMONICS`, summed over all axes, over those of the fundamental."""
 
 
 @dataclass(frozen=True, slots=True)
 class EllipsoidResult:
-    """Acceleration ellipses by both definitions, at a frequency and along a test direction."""
+    """Acceleration ellipsoid by both definitions, at a frequency and along a test direction."""
 
     frequency_hz: float
     along: str
+    """Name of the test direction."""
     amplitude_n: float
+    """Amplitude of the commanded force (N)."""
     moments: MomentEllipsoid
     phasor: PhasorEllipse
 
@@ -79,9 +86,10 @@ class EllipsoidResult:
 def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None) -> tuple[EllipsoidResult, ...]:
     """One result per sinusoid of the recording, in the order played.
 
-    The response must be acceleration in m/s^2 on three axes; meta["segments"] says of each segment its
-    frequency_hz, along and unit_vector (device frame). sensor_to_device: (3, 3) rotation from the sensor's frame to
-    the device's, identity by default. Raises ValueError where the recording does not hold what is needed.
+    The response must be acceleration in m/s^2 on three axes; meta["segments"] states frequency_hz, along and
+    unit_vector (in the device's frame) of each sinusoidal segment. sensor_to_device: (3, 3) rotation from the sensor's
+    frame to the device's, identity by default. Raises ValueError where the recording lacks any of these, has no
+    sinusoid, or has missing, constant or too few samples in one.
     """
     response = recording.response
     if response.samples.shape[1] != 3 or response.quantity != "acceleration":
@@ -108,9 +116,9 @@ def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None)
 
 
 def sensor_frame(recording: Recording) -> FloatArray | None:
-    """(3, 3): rotation from the sensor's axes to the device's, as the recording states it; None where it states none.
+    """(3, 3): rotation from the sensor's axes to the device's, as the recording states it; None if it states none.
 
-    Raises ValueError where what it states is no rotation: another matrix would stretch every ellipse.
+    Raises ValueError where its rows are not orthonormal: such a matrix would distort every ellipse.
     """
     sensor = recording.meta.get("sensor")
     stated = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
@@ -128,7 +136,8 @@ def sensor_frame(recording: Recording) -> FloatArray | None:
 
 
 def direction_frame(unit_vector: FloatArray) -> FloatArray:
-    """Rows are the axes of the test direction's frame; frame @ v turns a device vector into it."""
+    """(3, 3): the rows are the axes of the test direction's frame, so that frame @ v has the components of a vector v
+    of the device's frame. Raises ValueError unless unit_vector is (3,) and of norm 1 (within 0.1 %)."""
     first = np.asarray(unit_vector, dtype=np.float64)
     length = float(np.linalg.norm(first))
     if first.shape != (3,) or not math.isclose(length, 1.0, rel_tol=1e-3):
@@ -141,8 +150,8 @@ def direction_frame(unit_vector: FloatArray) -> FloatArray:
 
 
 def moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
-    """Ellipsoid of second moments of a motion. samples: (n, 3) in the test direction's frame. The mean is taken off:
-    gravity and offset are no motion."""
+    """Ellipsoid of second moments. samples: (n, 3), m/s^2, in the test direction's frame; their mean is subtracted
+    (gravity, sensor offset). Raises ValueError where they are constant."""
     moving = samples - samples.mean(axis=0)
     mean_square = moving.T @ moving / len(moving)
     eigenvalues, vectors = np.linalg.eigh(mean_square)
@@ -159,13 +168,13 @@ def moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
 
 
 def phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency_hz: float) -> PhasorEllipse:
-    """Ellipse that the fundamental of a motion draws. samples: (n, 3) in the test direction's frame, one period at
-    least."""
+    """Ellipse of the acceleration's fundamental. samples: (n, 3), m/s^2, in the test direction's frame. Raises
+    ValueError for less than one period, or where nothing moves at this frequency."""
     harmonics = max(1, min(HARMONICS, math.ceil(sample_rate_hz / 2 / frequency_hz) - 1))
     tones = phasors(samples, sample_rate_hz, frequency_hz, harmonics)
     fundamental = tones[0]
-    # Re(p exp(i phi)) over all phi is the image of the unit circle under [Re p, -Im p]: its singular values and
-    # left singular vectors are the ellipse's axes.
+    # Re(p exp(i phi)) over all phi is the image of the unit circle under the matrix [Re p, -Im p]: the semi-axes of
+    # the ellipse are the singular values of that matrix, along its left singular vectors.
     directions, axes, _ = np.linalg.svd(np.column_stack([fundamental.real, -fundamental.imag]), full_matrices=False)
     if axes[0] <= 0.0:
         raise ValueError("the response does not move at all: there is no ellipse")
@@ -184,6 +193,7 @@ def phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency_hz: flo
 
 
 def _result(samples: FloatArray, sample_rate_hz: float, segment: Segment, about: dict[str, Any]) -> EllipsoidResult:
+    """Result of one segment. samples: (n, 3), m/s^2, in the device's frame. about: its entry of meta["segments"]."""
     frequency_hz = float(about["frequency_hz"])
     framed = samples @ direction_frame(np.asarray(about["unit_vector"], dtype=np.float64)).T
     whole = int(len(framed) * frequency_hz / sample_rate_hz + 1e-9)
@@ -193,13 +203,14 @@ def _result(samples: FloatArray, sample_rate_hz: float, segment: Segment, about:
         frequency_hz=frequency_hz,
         along=str(about["along"]),
         amplitude_n=segment.amplitude,
-        # Whole periods alone: a torn period would tilt the mean squares.
+        # Only whole periods: a partial period would bias the mean squares.
         moments=moment_ellipsoid(framed[: round(whole * sample_rate_hz / frequency_hz)]),
         phasor=phasor_ellipse(framed, sample_rate_hz, frequency_hz),
     )
 
 
 def _descriptions(recording: Recording) -> Sequence[dict[str, Any]]:
+    """The entries of meta["segments"]. Raises ValueError unless there is a complete one for every sinusoid."""
     described = recording.meta.get("segments")
     if not isinstance(described, Sequence) or len(described) != len(recording.segments):
         raise ValueError(
@@ -214,7 +225,8 @@ def _descriptions(recording: Recording) -> Sequence[dict[str, Any]]:
 
 
 def _angles_deg(axis: FloatArray) -> tuple[float, float]:
-    """Angle of an axis (a line, so without sign) from the first axis, and its turn in the plane of the first two."""
+    """Tilt of an axis (a line without sign) from the first axis, and its signed angle when projected on the first two
+    axes, both in degrees. axis: (3,)"""
     tilt = math.degrees(math.atan2(float(np.linalg.norm(axis[1:])), abs(float(axis[0]))))
     sign = 1.0 if axis[0] >= 0 else -1.0
     turn = math.degrees(math.atan2(sign * float(axis[1]), sign * float(axis[0])))

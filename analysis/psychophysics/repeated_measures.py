@@ -1,7 +1,8 @@
-"""Analysis of variance within participants, with the corrections of Greenhouse and Geisser and of Huynh and Feldt.
+"""Repeated-measures analysis of variance with the corrections of Greenhouse and Geisser and of Huynh and Feldt, and
+Friedman's rank test.
 
-Every participant takes every frequency, so each is compared with themselves: differences between people leave the
-error term. Participants with a gap cannot take part in this analysis.
+Every participant takes every frequency (condition), so that differences between participants are removed from the error
+term: F = (SS_conditions / (k - 1)) / (SS_error / ((n - 1) (k - 1))). Participants with a missing value are left out.
 
 Source: S. W. Greenhouse, S. Geisser, Psychometrika 24 (1959), 95-112; effect size: S. Olejnik, J. Algina,
 Psychol. Methods 8 (2003), 434-447 (generalized eta squared); H. Huynh, L. S. Feldt, J. Educ. Stat. 1 (1976), 69-82;
@@ -23,19 +24,23 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Friedman:
-    """Friedman's rank test within participants: indifferent to the scale, and to how far a value lies below the cap."""
+    """Friedman's test, which uses only the ranks within each participant: neither the scale nor the distance of a value
+    from the cap matters. Results are None where the test is impossible; `notes` say why."""
 
     participants: int
+    """Number of participants without a missing value."""
     chi_squared: float | None
+    """Friedman's statistic, corrected for ties."""
     df: int | None
     p: float | None
+    """p-value by the chi-squared approximation with `df` degrees of freedom."""
     kendall_w: float | None
-    """Agreement of the participants' rankings: 0 none, 1 complete."""
+    """Kendall's coefficient of concordance, chi_squared / (participants df): 0 no agreement of the rankings, 1 full."""
     notes: tuple[str, ...]
 
 
 def friedman(values: Sequence[Sequence[float | None]]) -> Friedman:
-    """values[subject][condition]; rows with None or NaN are left out."""
+    """Friedman's test of values[subject][condition]; rows with None, NaN or infinity are left out."""
     rows = np.array(
         [row for row in values if all(value is not None and math.isfinite(value) for value in row)], dtype=np.float64
     )
@@ -57,12 +62,12 @@ def friedman(values: Sequence[Sequence[float | None]]) -> Friedman:
 
 @dataclass(frozen=True, slots=True)
 class RepeatedMeasures:
-    """Numbers that the data do not give are None; `notes` say why, in sentences."""
+    """Result of the analysis of variance. Numbers that the data do not determine are None; `notes` say why."""
 
     participants: int
-    """Those without a gap."""
+    """Number of participants without a missing value."""
     left_out: tuple[str, ...]
-    """Those with one."""
+    """Participants with a missing value."""
     conditions: int
     df_conditions: int | None
     df_error: int | None
@@ -70,27 +75,32 @@ class RepeatedMeasures:
     ss_participants: float | None
     ss_error: float | None
     f: float | None
+    """F of the conditions."""
     p_uncorrected: float | None
-    """Only right where all differences between conditions vary equally (sphericity)."""
+    """Valid only under sphericity: all differences between two conditions have the same variance."""
     epsilon: float | None
-    """Greenhouse-Geisser: 1 under sphericity, at least 1 / (conditions - 1)."""
+    """Epsilon of Greenhouse and Geisser: 1 under sphericity, at least 1 / (conditions - 1)."""
     p: float | None
-    """p-value with both degrees of freedom times epsilon: the one to report."""
+    """p-value with both degrees of freedom multiplied by epsilon: the p-value to report."""
     p_lower_bound: float | None
-    """p-value with the smallest possible epsilon."""
+    """p-value with the smallest possible epsilon, 1 / (conditions - 1)."""
     partial_eta_squared: float | None
+    """SS_conditions / (SS_conditions + SS_error)."""
     generalized_eta_squared: float | None
+    """SS_conditions / (SS_conditions + SS_participants + SS_error)."""
     notes: tuple[str, ...]
     epsilon_huynh_feldt: float | None = None
     """Huynh and Feldt's epsilon, at most 1. Less conservative than Greenhouse-Geisser's."""
     p_huynh_feldt: float | None = None
+    """p-value with both degrees of freedom multiplied by that epsilon."""
     mauchly_w: float | None = None
-    """1 under sphericity. None where there are too few participants for it."""
+    """W of Mauchly's test: 1 under sphericity. None for two conditions, or for too few participants."""
     mauchly_p: float | None = None
+    """p-value of Mauchly's test; small where sphericity is violated."""
 
 
 def repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float | None]]) -> RepeatedMeasures:
-    """values[subject][condition]; None and NaN are gaps."""
+    """Analysis of values[subject][condition], any unit; None, NaN and infinity count as missing."""
     full = [all(value is not None and math.isfinite(value) for value in row) for row in values]
     left_out = tuple(subject for subject, whole in zip(subjects, full, strict=True) if not whole)
     conditions = len(values[0]) if values else 0
@@ -119,22 +129,25 @@ def greenhouse_geisser(rows: FloatArray) -> float:
 
 
 def huynh_feldt(epsilon: float, participants: int, conditions: int) -> float:
-    """Huynh and Feldt's epsilon from Greenhouse and Geisser's; it may exceed 1, which means 1."""
+    """Huynh and Feldt's epsilon from Greenhouse and Geisser's. It may exceed 1; the caller limits it to 1."""
     n, df = participants, conditions - 1
     return (n * df * epsilon - 2.0) / (df * (n - 1.0 - df * epsilon))
 
 
 def mauchly(rows: FloatArray) -> tuple[float, float] | None:
-    """W and p of Mauchly's test of sphericity. None where the covariance of the contrasts has no full rank."""
+    """W and p of Mauchly's test of sphericity. rows: (participants, conditions). None for two conditions, or where the
+    covariance of the contrasts is singular."""
     n, k = rows.shape
     p = k - 1
     if p < 2 or n - 1 < p:
         return None
+    # Orthonormal contrasts: an orthogonal basis of which the constant vector is left out.
     contrasts = np.linalg.qr(np.column_stack([np.ones(k), np.eye(k)[:, 1:]]))[0][:, 1:]
     values = np.linalg.eigvalsh(np.cov(rows @ contrasts, rowvar=False))
     if values[0] <= 0:
         return None
     w = float(np.exp(np.log(values).sum() - p * np.log(values.mean())))
+    # Chi-squared approximation with Anderson's second-order term.
     df = p * (p + 1) // 2 - 1
     scale = (n - 1) - (2 * p**2 + p + 2) / (6 * p)
     chi_squared = -scale * math.log(w)
@@ -144,6 +157,7 @@ def mauchly(rows: FloatArray) -> tuple[float, float] | None:
 
 
 def _sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
+    """Sums of squares of conditions, participants and error. rows: (participants, conditions)."""
     n, k = rows.shape
     by_condition = rows.mean(axis=0) - rows.mean()
     by_participant = rows.mean(axis=1) - rows.mean()
@@ -154,10 +168,12 @@ def _sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
 def _compute_analysis(
     rows: FloatArray, left_out: tuple[str, ...], sums: tuple[float, float, float], notes: list[str]
 ) -> RepeatedMeasures:
+    """The analysis of complete rows (n, k). sums: of squares, as by `_sums_of_squares`, with an error above 0."""
     (n, k), (ss_conditions, ss_participants, ss_error) = rows.shape, sums
     df_conditions, df_error = k - 1, (n - 1) * (k - 1)
     f = (ss_conditions / df_conditions) / (ss_error / df_error)
     epsilon = greenhouse_geisser(rows)
+    # Otherwise the denominator of Huynh and Feldt's epsilon is not positive.
     corrected = min(1.0, huynh_feldt(epsilon, n, k)) if n - 1 > df_conditions * epsilon else 1.0
     sphericity = mauchly(rows)
     return RepeatedMeasures(
@@ -187,6 +203,7 @@ def _compute_analysis(
 def _empty_analysis(
     participants: int, left_out: tuple[str, ...], conditions: int, notes: list[str]
 ) -> RepeatedMeasures:
+    """A result without numbers; the last of `notes` says why."""
     return RepeatedMeasures(
         participants=participants,
         left_out=left_out,

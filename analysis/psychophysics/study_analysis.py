@@ -1,4 +1,9 @@
-"""Complete analysis of a study's trials: thresholds, statistics and warnings."""
+"""Complete analysis of a study's trials: thresholds, statistics and warnings.
+
+The published analysis (one-way ANOVA of reversal means between groups, with Tukey-Kramer comparisons) is reproduced and
+compared with analyses that fit the design: repeated measures, Friedman's test, and, as primary analysis, a hierarchical
+model of all answers. Equations and sources are in the modules that are called here. Levels are in N, contrasts in dB.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -36,25 +41,26 @@ from protocols.trial import Phase, Trial
 
 @dataclass(frozen=True, slots=True)
 class PracticeRun:
-    """Practice runs: short, at a fixed level, passed or not. They enter no result."""
+    """A practice run: short, at a fixed level, passed or not passed. Practice enters no other result."""
 
     subject: str
     session: str
     run: int
     frequency_hz: float
     trials: int
-    """Answered and counted."""
+    """Number of answered trials that count."""
     right: int
+    """Number of correct answers among them."""
     right_of_last: int
     """Correct answers among the last trials that the criterion covers."""
     passed: bool
     over: bool
-    """False: broken off before it was passed or out of trials."""
+    """Whether the run ended by its rule: passed, or its trials used up. False: it was broken off before."""
 
 
 def practice_runs(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[PracticeRun, ...]:
-    """Runs of practice in the order in which they first occur. Practice has the phase TRAINING and follows the training
-    staircases."""
+    """Practice runs in the order in which they first occur. Their trials have the phase TRAINING, and their run numbers
+    follow those of the training staircases."""
     first = len(protocol.training.frequencies_hz)
     places = range(first, first + len(protocol.practice.frequencies_hz))
     grouped: dict[tuple[str, str, int], list[Trial]] = {}
@@ -89,7 +95,7 @@ class StudyAnalysis(Summarised):
     population: Population | None
     """None when there is no trial at all."""
     trials: tuple[Trial, ...]
-    """Those of the test phase."""
+    """Trials of the test phase."""
     runs: tuple[Run, ...]
     thresholds: tuple[Threshold, ...]
     """One per run, in the same order."""
@@ -99,30 +105,29 @@ class StudyAnalysis(Summarised):
     within: RepeatedMeasures
     ranks: Friedman
     difference: str
-    """Reason for the difference between the published one-way analysis and the one within participants, in this
-    study."""
+    """Difference between the published one-way analysis and the analysis within participants, in words."""
     primary: PrimaryAnalysis | None
-    """The hierarchical model of all answers. None below two participants, and below two frequencies with answers."""
+    """The hierarchical model of all answers; None with fewer than two participants or two frequencies with answers."""
     single: SinglePersons | None
-    """Each person's thresholds by likelihood, where there is no hierarchical model to give them."""
+    """Each person's thresholds by maximum a posteriori; None where there is a hierarchical model, or no answer."""
     mean_contrasts: tuple[Contrast, ...]
-    """Reversal means in dB against the lowest frequency with answers, within participants."""
+    """Differences of reversal means (dB) from the lowest frequency with answers, within participants."""
     tobit: tuple[Contrast, ...]
-    """The same by Tobit's model, a sensitivity analysis; empty where nothing is cut."""
+    """The same contrasts by Tobit's model for values cut by the cap, a sensitivity analysis; empty where none is."""
     declared: str
-    """The protocol's declaration before the data, in words."""
+    """The analysis that the protocol declares before any data, in words."""
     declared_result: DeclaredResult
     compared: str
     """Differences between the published and the primary analysis, in words."""
     warnings: tuple[str, ...]
     detection: tuple[Threshold, ...]
-    """One per detection run."""
+    """Detection thresholds, one per detection run."""
     detection_table: ThresholdTable
     catches: tuple[CatchTally, ...]
     practice: tuple[PracticeRun, ...]
     cues: tuple[CueFinding, ...]
     cue_gaps: tuple[CueGap, ...]
-    """Differences between the directions as delivered, and whether answers followed them."""
+    """Differences between the two directions in the delivered stimulus, and whether answers followed them."""
 
     def summary(self) -> Summary:
         table = self.table
@@ -136,6 +141,7 @@ class StudyAnalysis(Summarised):
 
 
 def _mean_text(values: Sequence[float | None]) -> str:
+    """The mean of the known thresholds (N) and their number, in words."""
     known = [value for value in values if value is not None]
     return f"mean threshold {sum(known) / len(known):.3g} N of {len(known)}" if known else "no threshold"
 
@@ -143,7 +149,7 @@ def _mean_text(values: Sequence[float | None]) -> str:
 def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Sequence[str] = ()) -> StudyAnalysis:
     """Thresholds and statistics of trials of one population that followed one protocol.
 
-    left_out: sessions and trials that are not among these, and why, in sentences; shown beside declared exclusions.
+    left_out: sessions and trials that are not among these, with the reason, in sentences; listed in `declared_result`.
     Raises ValueError when the trials mix people, simulated participants and people who felt nothing (split them
     with `split_by_population` first), and InconsistentTrialsError when rows contradict the protocol's staircase.
     """
@@ -180,6 +186,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
 
 
 def _single_population(trials: Sequence[Trial]) -> Population | None:
+    """The population of all trials; None without trials. Raises ValueError where populations are mixed."""
     parts = split_by_population(trials)
     if len(parts) > 1:
         raise ValueError(
@@ -190,7 +197,8 @@ def _single_population(trials: Sequence[Trial]) -> Population | None:
 
 
 def _models(trials: Sequence[Trial], protocol: StudyProtocol) -> tuple[PrimaryAnalysis | None, SinglePersons | None]:
-    """The hierarchical model, or where there is nothing to compare, everyone's numbers for themselves."""
+    """The hierarchical model; where it has too few participants or frequencies, thresholds of single persons instead.
+    At most one of the two is not None."""
     answers, cap_n = count_answers(trials, protocol.stimulus.frequencies_hz), protocol.staircase.cap_n
     primary = primary_analysis(answers, cap_n, declared_hz=protocol.analysis.contrast_hz)
     return primary, fit_single_persons(answers, cap_n) if primary is None and answers is not None else None
@@ -199,8 +207,8 @@ def _models(trials: Sequence[Trial], protocol: StudyProtocol) -> tuple[PrimaryAn
 def _mean_contrasts(
     rows: Sequence[Threshold], primary: PrimaryAnalysis | None, protocol: StudyProtocol
 ) -> tuple[tuple[Contrast, ...], tuple[Contrast, ...]]:
-    """Contrasts of reversal means, and of Tobit's model of them; at the frequencies of the primary model where there is
-    one, so that all have the same lowest frequency as their reference."""
+    """Contrasts of the reversal means and of Tobit's model of them (dB). They use the frequencies of the primary model
+    where it exists, so that all contrasts have the same reference, the lowest frequency."""
     frequencies_hz = primary.frequencies_hz if primary is not None else protocol.stimulus.frequencies_hz
     table = threshold_table(rows, frequencies_hz, "threshold_db")
     if not table.subjects or not table.frequencies_hz:
@@ -211,7 +219,8 @@ def _mean_contrasts(
 
 
 def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
-    """The statistics as JSON values: None where the data give no number, with the reason in the notes beside it."""
+    """The statistics as JSON values, format `hapteq-anova`, version 1. A number that the data do not determine is
+    None; the notes of the same entry give the reason."""
     return {
         "format": "hapteq-anova",
         "version": 1,
@@ -242,14 +251,15 @@ def anova_document(analysis: StudyAnalysis) -> dict[str, Any]:
 
 
 def _write_declared_result(result: DeclaredResult) -> dict[str, Any]:
-    """What was left out as a number: its sentences name sessions of people who withdrew."""
+    """The declared result with the number of left-out sessions and trials only, because the sentences about them name
+    sessions of people who withdrew."""
     document = asdict(result)
     document["left_out_count"] = len(document.pop("left_out"))
     return document
 
 
 def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
-    """The published analysis beside the one within participants, in words and numbers."""
+    """Comparison of the published analysis with the analysis within participants, in words and numbers."""
     if anova.p is None or within.p is None:
         text = "neither" if anova.p is None and within.p is None else "only one"
         return (
@@ -270,5 +280,7 @@ def design_difference(anova: OneWayAnova, within: RepeatedMeasures) -> str:
 
 
 def _write_removed_percent(within: RepeatedMeasures) -> str:
+    """Share of the spread within frequencies that is due to participants: SS_participants / (SS_participants +
+    SS_error), in per cent."""
     between, error = within.ss_participants or 0.0, within.ss_error or 0.0
     return f"{100 * between / (between + error):.0f} %"

@@ -1,12 +1,16 @@
-"""Tobit model of reversal means: a sensitivity analysis, in which a run that the cap cut counts as "at least this".
+"""Tobit model of reversal means: a sensitivity analysis in which a run that the cap cut is right-censored.
 
-    mean of a run in dB = frequency + person + error, both normal; where the cap cut, P(mean at least what was found)
+    y_ij = mu_j + b_i + e_ij,    b_i ~ N(0, sd_people²),  e_ij ~ N(0, sd_error²)    person i, frequency j; y in dB
 
-A cut mean is no clean bound (its valleys lie below the cap), and reversal means near the cap come out low before they
-are cut, so this mends a part of the bias only: `measured_coverage` says how much is left.
+y is the mean level at the reversals of a run. A run that the cap did not cut contributes the density of y to the
+likelihood; a cut run contributes P(Y >= y). The random effect b_i is integrated out by Gauss-Hermite quadrature.
 
-Source: J. Tobin, Econometrica 26 (1958), 24-36; the person integrated out by Gauss and Hermite's rule: J. C. Pinheiro,
-D. M. Bates, J. Comput. Graph. Stat. 4 (1995), 12-35.
+Limits: the mean of a cut run is not an exact lower bound, because its valleys lie below the cap, and means near the cap
+are biased low even without being cut. The model therefore removes only a part of the bias; `measured_coverage` holds
+the coverage that its intervals reach in simulations.
+
+Sources: J. Tobin, Econometrica 26 (1958), 24-36; quadrature: J. C. Pinheiro, D. M. Bates, J. Comput. Graph. Stat. 4
+(1995), 12-35.
 """
 
 import math
@@ -23,30 +27,34 @@ from analysis.psychophysics.group_contrasts import Contrast, holm_correction
 from equalizer.signals.signal import FloatArray
 
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(25)
-"""Gauss-Hermite rule of the integral over one person's latent mean."""
+"""Gauss-Hermite rule of the integral over a person's random effect: weight function exp(-x²/2), x = b / sd_people."""
 SD_BOUNDS_DB = (-4.0, 3.5)
-"""Logarithms of both standard deviations, in dB."""
+"""Bounds of the natural logarithm of both standard deviations: 0.018 dB to 33 dB."""
 STEP = 1e-3
-"""Step of the finite differences that give the curvature: dB for means, logarithms for standard deviations."""
+"""Step of the finite differences of the log-likelihood's second derivatives: in dB for means, in natural logarithms for
+standard deviations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TobitFit:
-    """Maximum-likelihood estimate of Tobit's model of reversal means."""
+    """Maximum-likelihood estimate of the Tobit model of reversal means."""
 
     parameters: FloatArray
-    """(k + 2,): means in dB, log SD of people, log SD of the error."""
+    """(k + 2,): means mu in dB, then the natural logarithms of sd_people and sd_error."""
     covariance: FloatArray
-    """Inverse curvature of minus the log-likelihood."""
+    """(k + 2, k + 2): inverse Hessian of minus the log-likelihood; zero for a standard deviation at its bound."""
     log_likelihood: float
 
 
 def tobit_contrasts(
     frequencies_hz: Sequence[float], values_db: FloatArray, cut: NDArray[np.bool_], confidence: float
 ) -> tuple[Contrast, ...]:
-    """Each frequency against the first. values_db, cut: (n, k); NaN for a gap. Wald's intervals with Student's t, n - 1
-    degrees of freedom. A frequency without an uncut run is left out: its mean has no upper end. Empty where nothing is
-    cut (the model then says what reversal means say), and below three people."""
+    """Contrasts mu_j - mu_1 of each frequency with the first, with Wald intervals and p values of Student's t with
+    n - 1 degrees of freedom. values_db: (n, k), dB, NaN for a gap. cut: (n, k), whether the cap cut the run.
+
+    A frequency without an uncut run is left out, because its likelihood has no maximum. Empty where no run is cut (the
+    analysis of the plain means then suffices), the first frequency is left out, or there are fewer than three people.
+    """
     known = np.isfinite(values_db)
     bounded: NDArray[np.bool_] = np.asarray((known & ~cut).any(axis=0))
     if not (cut & known).any() or len(values_db) < 3 or not bounded[0]:
@@ -79,7 +87,8 @@ def tobit_contrasts(
 
 
 def fit_tobit(values_db: FloatArray, cut: NDArray[np.bool_]) -> TobitFit:
-    """Maximum likelihood. values_db, cut: (n, k); NaN for a gap; each column needs a value that is not cut."""
+    """Maximum-likelihood fit of the Tobit model (L-BFGS-B). values_db: (n, k), dB, NaN for a gap; cut: (n, k). Each
+    column needs a value that is not cut. Raises LinAlgError where the Hessian is singular."""
     k = values_db.shape[1]
     begin = np.concatenate([np.nanmean(values_db, axis=0), [0.7, 0.7]])
 
@@ -90,7 +99,7 @@ def fit_tobit(values_db: FloatArray, cut: NDArray[np.bool_]) -> TobitFit:
     found = minimize(cost, begin, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-6})
     steps = STEP * np.eye(k + 2)
     curvature = np.array([[_second(cost, found.x, a, b) for b in steps] for a in steps]) / STEP**2
-    # With the spread of people at its lower end the curvature there says nothing, and the means do not depend on it.
+    # At a bound, the Hessian by a standard deviation is meaningless: that parameter is held fixed in the covariance.
     free = np.array([True] * k + [SD_BOUNDS_DB[0] + STEP < value < SD_BOUNDS_DB[1] - STEP for value in found.x[k:]])
     covariance = np.zeros((k + 2, k + 2))
     covariance[np.ix_(free, free)] = np.linalg.inv(curvature[np.ix_(free, free)])
@@ -98,10 +107,12 @@ def fit_tobit(values_db: FloatArray, cut: NDArray[np.bool_]) -> TobitFit:
 
 
 def _second(cost: Callable[[FloatArray], float], at: FloatArray, a: FloatArray, b: FloatArray) -> float:
+    """Central second difference of the cost along the steps a and b, not divided by their lengths."""
     return (cost(at + a + b) - cost(at + a - b) - cost(at - a + b) + cost(at - a - b)) / 4.0
 
 
 def _log_likelihood(parameters: FloatArray, values_db: FloatArray, cut: NDArray[np.bool_]) -> float:
+    """Log-likelihood of the module's model at `parameters` (k + 2,); gaps contribute nothing."""
     k = values_db.shape[1]
     spread, error = math.exp(parameters[k]), math.exp(parameters[k + 1])
     z = (values_db[:, :, None] - parameters[:k, None] - spread * NODES) / error

@@ -2,8 +2,8 @@
 
 The experiment asks for the direction of a vibration. The device may deliver the two directions with different
 amplitudes, harmonics or motion across the direction, and a participant may answer by such a difference instead. Two
-tables per cue and frequency: the sensitivity d' that the cue alone would give (`cue_ability`), and whether answers
-depended on it (`answers_on_delivery`, logistic regression).
+tables with a row per cue and frequency: the sensitivity d' that the cue alone would give (`cue_ability`), and whether
+the answers depended on the cue (`answers_on_delivery`, logistic regression).
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ _MEANING = (
 
 def cue_section(found: Sequence[CueFinding], gaps: Sequence[CueGap], rule: StaircaseRule) -> list[Section]:
     """Section on cues other than the direction; empty where no trial was measured. found: a finding per cue and
-    frequency. gaps: trials without a measured delivery. rule: of the staircase, for the words on sensitivity."""
+    frequency. gaps: trials without a measurement of a cue. rule: the staircase rule, which sets the target d'."""
     if not found:
         return []
     sentences = (*(cue_warnings(found) or (_no_cue_text(found),)), *filter(None, [gap_text(gaps)]))
@@ -51,7 +51,8 @@ def _no_cue_text(found: Sequence[CueFinding]) -> str:
 
 
 def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
-    """A row per cue and frequency. sensitivity: what d' the staircase aims at, as a sentence."""
+    """Table of d' by each cue alone, a row per cue and frequency. sensitivity: sentence on the staircase's target
+    d'."""
     return Table(
         caption="Sensitivity that each cue alone would give",
         header=(
@@ -79,6 +80,7 @@ def _ability_table(found: Sequence[CueFinding], sensitivity: str) -> Table:
 
 
 def _answer_table(found: Sequence[CueFinding]) -> Table:
+    """Table of the logistic regression of answers on each cue, a row per cue and frequency."""
     return Table(
         caption="Whether answers depend on the delivery within a direction",
         header=("Cue", "Frequency", "Trials", "Spread (dB)", "Logits per dB", "95 % interval", "p (Holm)", "Answers"),
@@ -108,6 +110,7 @@ def _slope_texts(answers: AnswersOnDelivery) -> tuple[str, str]:
 
 
 def _verdict(finding: CueFinding) -> str:
+    """Cell text: whether the answers depend on the cue, after Holm's correction."""
     if finding.followed:
         return "depend on the cue"
     return "do not" if finding.answers.is_conclusive else "not testable"

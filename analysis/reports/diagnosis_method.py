@@ -1,9 +1,12 @@
-"""Description of the method of a diagnosis, with the figures of the diagnosis."""
+"""Paragraphs of a diagnosis report on the method: how errors were measured, how the samples were split, how the noise
+was estimated, how the model was re-tuned and effects were chosen, how the map is tested. Figures are those of the
+diagnosis itself."""
 
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
 from analysis.wording import conjoin
 
+# Parts of the sentences; free simulation is the output error, predicted force the equation error (inverse dynamics).
 _FREE = (
     "The model was played from rest by the recorded commands alone, and its answer compared with what was measured, "
     "sample by sample (free simulation)."
@@ -17,15 +20,18 @@ _HOW = {
     "rest": "from what is heard while nothing is driven",
     "quiet band": "from the frequencies above all that was driven",
 }
+"""How the noise was measured, by `NoiseFloor.how`."""
 _ROLES = (
     ("fit", "were fitted to"),
     ("choose", "served to choose between explanations"),
     ("test", "were sealed and only looked at in the end"),
 )
+"""Use of each set of samples, by its key in `Findings.split_s`."""
 
 
 def method_paragraphs(found: Findings) -> tuple[str, ...]:
-    """Error, split, noise, re-tuning and choice, map."""
+    """The paragraphs in this order: error measure, split of the samples, noise, re-tuning and choice of effects, map of
+    the mismatch. Paragraphs without data are left out."""
     return (
         _error_paragraph(found),
         *_split_paragraphs(found),
@@ -36,6 +42,7 @@ def method_paragraphs(found: Findings) -> tuple[str, ...]:
 
 
 def _error_paragraph(found: Findings) -> str:
+    """The error measure that was used, and the units of errors."""
     measure = found.diagnosis.error
     if measure == "free simulation":
         how = _FREE
@@ -53,11 +60,13 @@ def _error_paragraph(found: Findings) -> str:
 
 
 def _split_paragraphs(found: Findings) -> tuple[str, ...]:
+    """Seconds of the recordings that served for fitting, validation and test; none where no times are known."""
     parts = [f"{found.split_s[part]:.3g} s {did}" for part, did in _ROLES if found.split_s.get(part)]
     return (f"Of the recorded time, {conjoin(parts)}.",) if parts else ()
 
 
 def _noise_paragraphs(found: Findings) -> tuple[str, ...]:
+    """Source of the noise estimate, with its remarks; none without an estimate."""
     if found.floor is None:
         return ()
     how = _HOW.get(found.floor.how)
@@ -66,6 +75,7 @@ def _noise_paragraphs(found: Findings) -> tuple[str, ...]:
 
 
 def _choice_paragraphs(found: Findings) -> tuple[str, ...]:
+    """Re-tuning within the calibration's tolerance, and the search for effects; none where nothing is missing."""
     if not found.diagnosis.mismatch:
         return ()
     bound = RETUNING_BOUND if found.tuning is None else found.tuning.bound
@@ -80,6 +90,7 @@ def _choice_paragraphs(found: Findings) -> tuple[str, ...]:
 
 
 def _map_paragraph() -> str:
+    """Significance in the map of the mismatch: false discovery rate, closed testing."""
     return (
         "In the map, what recordings in which nothing is missing have counts as no mismatch; what "
         "the most complete model errs by on held-out data of the same channel, in the same octave and those beside it, "

@@ -1,4 +1,7 @@
-"""A report as a value, and its one self-contained page of HTML."""
+"""Data structure of a report, and its rendering as a single self-contained HTML page (template `page.html.j2`).
+
+Figures are inline SVG, and all text is escaped, so that a page can be archived or sent as one file.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,13 +14,15 @@ from analysis.figures.picture import Picture, picture_svg
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Everything is text already. The first column names the row."""
+    """A table of a report. All cells are formatted text; the first column names the row."""
 
     caption: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+    """Sentences shown with the table."""
     folded: bool = False
+    """Whether only the caption is shown until the reader opens it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,27 +32,29 @@ class Section:
     heading: str
     paragraphs: tuple[str, ...] = ()
     points: tuple[str, ...] = ()
-    """Shown as a list."""
+    """Sentences shown as a list."""
     pictures: tuple[Picture, ...] = ()
     tables: tuple[Table, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A whole report, as `render_page` takes it."""
+    """A whole report; `render_page` renders it."""
 
     title: str
     summary: str
     banner: str
-    """Important warnings; empty = none."""
+    """Important warnings, shown at the top of the page; empty = none."""
     sections: tuple[Section, ...]
     generated: str
-    """When, by the clock of the place, with its offset."""
+    """Local time at which the report was made, with the UTC offset."""
     provenance: Mapping[str, str] = field(default_factory=dict)
+    """Versions, hashes and inputs by name, shown at the end of the page."""
 
 
 def render_page(page: Page) -> str:
-    """The page as HTML that refers to nothing outside itself. All text is escaped."""
+    """The page as HTML without references to other files. All text is escaped. Raises jinja2.UndefinedError where the
+    template uses a name that does not exist."""
     environment = Environment(
         loader=PackageLoader("analysis.reports", "."),
         autoescape=True,
@@ -59,5 +66,6 @@ def render_page(page: Page) -> str:
 
 
 def _svg(picture: Picture) -> Markup:
-    # Our own drawing, with its title escaped by inline_svg.
+    """Inline SVG of a picture, not escaped again."""
+    # Safe as markup: drawn by this program, and `inline_svg` escapes its title.
     return Markup(picture_svg(picture))

@@ -1,4 +1,9 @@
-"""The tables of the primary analysis in a study report."""
+"""Section of a study report on the primary analysis, a hierarchical psychometric model of all answers.
+
+Tables: median thresholds by frequency, contrasts between frequencies, likelihood thresholds of single runs, estimates
+per person, and goodness of fit. Forces are in N, level differences in dB. `psychophysics.hierarchy.primary` computes
+the values; this module only words them.
+"""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +21,7 @@ from analysis.threshold_words import threshold_words
 from analysis.wording import NONE, conjoin, format_signed, number, p_text, p_value
 
 AT_BOUND = 0.01
-"""Of the logarithm of a spread."""
+"""Distance of the logarithm of a spread from its upper bound below which the search counts as ended at the bound."""
 MEANING = (
     "One psychometric model of all answers: thresholds differ by frequency, by person, and by person at each "
     "frequency; slopes and response biases differ by person. An answer at the cap is an answer like any other, "
@@ -24,25 +29,29 @@ MEANING = (
     "likelihood. Threshold: the level at which an attentive answer without a bias towards one direction is right in "
     "79.37 %."
 )
+"""Introduction of the section on the model of all answers."""
 
 RUN_MEANING = (
     "From the answers at this frequency alone, with the person's slope and criterion and the lapse rate of the model. "
     "Above the cap, or below the levels played (right answers only): no size, a one-sided bound."
 )
+"""Note on the thresholds of single runs."""
 SINGLE_MEANING = (
     "From the answers at this frequency alone. What a run does not tell is averaged over usual people: slopes within a "
     "factor of 1.5, response biases within 0.3 d', few lapses. Above the cap, or below the levels played (right "
     "answers only): no size, a one-sided bound."
 )
+"""Note on thresholds by likelihood where there is no model of all answers."""
 TOBIT_MEANING = (
     "A mean that the cap cut counts as at least this. A sensitivity analysis: {too_low}. Wald's intervals, t with "
     "n − 1 degrees of freedom."
 )
+"""Note on the contrasts by Tobit's model (values censored at the cap)."""
 
 
 def primary_section(analysis: StudyAnalysis) -> Section:
     """Section on the model of all answers: medians, contrasts, runs, persons and goodness of fit. Without that model, a
-    section on thresholds by likelihood of single persons, or on why there are none."""
+    section on thresholds by likelihood of single persons, or on the reason why there are none."""
     primary, means = analysis.primary, analysis.mean_contrasts
     if primary is None:
         return _single_section(analysis)
@@ -67,6 +76,7 @@ def primary_section(analysis: StudyAnalysis) -> Section:
 
 
 def _single_section(analysis: StudyAnalysis) -> Section:
+    """Section without a model of all answers: thresholds of single persons, or the reason why there are none."""
     single = analysis.single
     if single is None:
         return Section("All answers in one model", paragraphs=(analysis.compared,))
@@ -76,10 +86,12 @@ def _single_section(analysis: StudyAnalysis) -> Section:
 
 
 def _measured(analysis: StudyAnalysis, name: str) -> tuple[str, ...]:
+    """Notes on the measured coverage of an analysis's intervals where the cap cut the data (`coverage_notes`)."""
     return coverage_notes((name,), analysis.table, analysis.protocol.staircase)
 
 
 def _overall(primary: PrimaryAnalysis) -> str:
+    """Paragraph on the test over all frequencies, the spread between people, and the common parameters."""
     overall = primary.overall
     people = f" ({overall.participants} people with enough answers at each)" if overall.left_out else ""
     test = (
@@ -100,7 +112,8 @@ def _overall(primary: PrimaryAnalysis) -> str:
 
 
 def far_above_words(primary: PrimaryAnalysis) -> str:
-    """A sentence with a space before it where frequencies cannot be compared with each other; else nothing."""
+    """Sentence, with a leading space, on frequencies whose medians lie so far above the cap that they cannot be
+    compared with each other; empty with fewer than two such frequencies."""
     if len(primary.far_above_hz) < 2:
         return ""
     names = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])
@@ -108,8 +121,8 @@ def far_above_words(primary: PrimaryAnalysis) -> str:
 
 
 def describe_undetermined(primary: PrimaryAnalysis) -> str:
-    """A sentence with a space before it where a spread between people ended at the bound of its search; else nothing.
-    It happens with few people, whose answers hold a slope of 2 and one of 20 nearly equally probable."""
+    """Sentences, with a leading space, where a spread between people ended at the upper bound of its search; else
+    empty. This happens with few people, whose answers make slopes of 2 and of 20 almost equally likely."""
     found = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
     names = ("thresholds", "thresholds from frequency to frequency", "slopes", "response biases")
     at_bound = [
@@ -126,8 +139,8 @@ def describe_undetermined(primary: PrimaryAnalysis) -> str:
 
 
 def limit_words(primary: PrimaryAnalysis) -> str:
-    """Sentence on the direction limit: the frequency at which the median participant's threshold reaches the cap, with
-    its interval."""
+    """Sentence on the direction limit: the frequency (Hz) at which the median participant's threshold reaches the cap,
+    with its interval."""
     limit = primary.limit
     low, high = primary.frequencies_hz[0], primary.frequencies_hz[-1]
     lower = f"{limit.lower_hz:.1f} Hz" if limit.lower_hz is not None else f"below {low:g} Hz"
@@ -142,6 +155,7 @@ def limit_words(primary: PrimaryAnalysis) -> str:
 
 
 def _medians(primary: PrimaryAnalysis) -> Table:
+    """Table of the median thresholds with intervals, in N and in dB re 1 N."""
     rows = []
     for median in primary.medians:
         shown = interval_words(median.lower_n, median.upper_n, median.above_cap)
@@ -160,7 +174,8 @@ def _medians(primary: PrimaryAnalysis) -> Table:
 
 
 def interval_words(lower: float | None, upper: float | None, above_cap: bool, digits: int = 2) -> str:
-    """Interval of a median as text; the upper end is missing above the cap, and both below three people there."""
+    """Interval of a median as text. upper: None above the cap. lower: None where there are too few people, or where no
+    lower bound was found above the cap."""
     if lower is None:
         return "no lower bound" if above_cap else "no interval: too few people"
     return f"above {number(lower, digits)}" if upper is None else f"{number(lower, digits)} to {number(upper, digits)}"
@@ -169,6 +184,7 @@ def interval_words(lower: float | None, upper: float | None, above_cap: bool, di
 def _contrasts(
     caption: str, rows: Sequence[Contrast], medians: Sequence[MedianThreshold], notes: Sequence[str]
 ) -> Table:
+    """Table of differences between two frequencies in dB; frequencies whose medians are above the cap are marked."""
     above = {median.frequency_hz for median in medians if median.above_cap}
     return Table(
         caption=caption,
@@ -198,6 +214,7 @@ def _contrasts(
 
 
 def _runs(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[str, ...]) -> Table:
+    """Table of the maximum-likelihood thresholds of single runs, in N."""
     return Table(
         caption="Single thresholds by maximum likelihood (N)",
         header=("Participant", "Frequency", "Trials", "Threshold", f"{100 * confidence:g} % likelihood interval"),
@@ -208,7 +225,7 @@ def _runs(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[str, ..
 
 
 def run_words(run: RunLikelihood) -> tuple[str, str]:
-    """Threshold and interval in newtons; a dash where the answers contradict nothing."""
+    """Threshold and likelihood interval in N; a dash for an interval that excludes no threshold."""
     lower, upper = newton_or_none(run.lower_db), newton_or_none(run.upper_db)
     if run.below:
         size = "below the levels played"
@@ -222,6 +239,7 @@ def run_words(run: RunLikelihood) -> tuple[str, str]:
 
 
 def _persons(primary: PrimaryAnalysis) -> Table:
+    """Table of the model's estimates per person: thresholds in N, slope, criterion (shrunk towards the population)."""
     return Table(
         caption="People, as the model sees them (N)",
         header=("Participant", *(f"{f:g} Hz" for f in primary.frequencies_hz), "Slope", "Criterion"),
@@ -243,6 +261,7 @@ def _persons(primary: PrimaryAnalysis) -> Table:
 
 
 def _goodness(primary: PrimaryAnalysis) -> Table:
+    """Table of predicted and observed shares of right answers, by bins of trials."""
     return Table(
         caption="Predicted and observed shares of right answers",
         header=("Trials", "Predicted", "Observed", "z"),

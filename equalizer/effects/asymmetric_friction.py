@@ -1,4 +1,7 @@
-"""Asymmetric Coulomb friction: dry friction that is stronger in one direction than in the other."""
+"""Asymmetric Coulomb friction: dry friction that is stronger in one direction of motion than in the other.
+
+The force jumps at v = 0; the simulation replaces the jump by a bristle of nanometre travel (`dry_friction_kernel`).
+"""
 
 import numpy as np
 
@@ -10,18 +13,21 @@ from equalizer.effects.starts.starting_values import regress_beside_linear, sele
 from equalizer.signals.signal import FloatArray
 
 _GUESS = 1.3
-"""Starting ratio of the two levels where the data do not determine it."""
+"""Ratio of the two levels in the starting values that are tried in addition to the measured ones."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+    """Mean friction force over the step. memory: deflection of the bristle."""
     return float(friction_force(parameters[0], parameters[1], memory[0], memory, at))
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Levels by regression of the missing force on either direction of sliding, then two guesses with the same mean.
+    Empty where the mean level is not positive."""
     motion = select_sliding_motion(evidence, axis)
     forward = np.asarray(motion.velocity > 0, dtype=np.float64)
-    # Without a constant force in the regression, which would absorb the asymmetry.
+    # No constant force among the regressors: it would absorb the asymmetry.
     positive, negative = regress_beside_linear(motion, constant=False).fit(-forward, 1 - forward).strengths.tolist()
     mean = (positive + negative) / 2
     if mean <= 0:

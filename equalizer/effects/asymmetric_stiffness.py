@@ -1,4 +1,7 @@
-"""Quadratic stiffness: a spring that is stiffer in one direction than in the other."""
+"""Asymmetric (quadratic) stiffness: a spring that is stiffer in one direction than in the other.
+
+F = -k2 x^2 adds to the linear spring force -k x: with k2 > 0 the spring stiffens for x > 0 and softens for x < 0.
+"""
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
@@ -10,8 +13,8 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean of the force at the step's start and end; the position at the end depends on the force (implicit step, by
-    Newton's method)."""
+    """Mean of the forces at the start and the end of the step. The end position depends on the force: an implicit step,
+    solved by Newton's method, with the derivative kept at 0.5 or more against diverging steps."""
     half, start = 0.5 * parameters[0], at[X] ** 2
     force = -half * (start + at[X_FREE] ** 2)
     for _ in range(4):
@@ -23,6 +26,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """k2 by regression of the missing force on -x^2, the linear terms projected out."""
     motion = axis_motion(evidence, axis)
     k2 = float(regress_beside_linear(motion).fit(-(motion.position**2)).strengths[0])
     return ({"k2": k2},) if k2 != 0 else ()

@@ -1,4 +1,8 @@
-"""Play in a drive: the motor moves alone until it hits the handle's side of the gap."""
+"""Backlash in a drive: within the gap the motor moves alone, at either end of it contact drives the handle.
+
+The moving mass along the driven axis is split: the motor becomes a body of its own, which the command drives, and acts
+on the handle through a spring and a damper that only push.
+"""
 
 from dataclasses import replace
 
@@ -17,24 +21,26 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import spectral_density
 
 STEPS = 20
-"""Integration steps per sample: a contact lasts about a millisecond."""
+"""Integration steps per sample: a contact lasts only about a millisecond."""
 MOTOR_SHARE, CONTACT_HZ, CONTACT_RATIO = 0.3, 300.0, 0.03
-"""Defaults for what a file leaves out: the motor's share of the moving mass; natural frequency of the motor on its
-contact; damping ratio of that contact."""
+"""Defaults of parameters that a file leaves out: the motor's share of the moving mass; natural frequency (Hz) of the
+motor mass on the contact's spring; damping ratio of that oscillator."""
 GAPS, TRIED_S, BAND_S = np.geomspace(0.02, 3.0, 14), 2.0, 0.128
-"""Gaps that are tried, relative to the travel of the motor alone; seconds of the recording that are simulated; length
-of a spectrum's window in seconds."""
+"""Starting values: gaps that are tried, relative to the travel of the free motor (see `_starts`); length (s) of each
+simulated excerpt; length (s) of a spectrum's window."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Force of the contact's spring and damper, averaged over the step; the contact only pushes, it never pulls."""
+    """Mean force (N) of the contact's spring and damper over the step, solved for implicitly; the contact never pulls.
+    parameters: gap, stiffness, damping; `at` describes the motion of motor minus handle."""
     half, stiffness, rate = 0.5 * parameters[0], parameters[1], parameters[2] / at[STEP_S]
     for way in (1.0, -1.0):
         start, end = max(way * at[X] - half, 0.0), way * at[X_FREE] - half
         if start <= 0 and end <= 0:
             continue
-        # Weighted towards the force at the end where the contact is too stiff for the step: the mean would overshoot.
+        # For a contact that is stiff relative to the step, the force at the end gets more weight: the plain mean of
+        # start and end would overshoot.
         slack = stiffness * at[X_PER_N]
         late = (0.5 + slack) / (1 + slack)
         push = stiffness * ((1 - late) * start + late * end) + rate * (end - start)
@@ -49,7 +55,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _motor_and_contact(model: MechanicalModel, axis: int, values: Values) -> tuple[float, float, float]:
-    """Mass of the motor's side, and stiffness and damping of the contact."""
+    """Mass of the motor (at most 0.9 of the mass along the axis), and stiffness and damping of the contact."""
     known = value_along(model.mass, driven_axes(model)[:, axis])
     mass = min(values.get("motor_mass", MOTOR_SHARE * known), 0.9 * known)
     stiffness = values.get("contact_stiffness", mass * (2 * np.pi * CONTACT_HZ) ** 2)
@@ -57,6 +63,8 @@ def _motor_and_contact(model: MechanicalModel, axis: int, values: Values) -> tup
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[MechanicalModel, FloatArray]:
+    """The model with the motor as a further coordinate, and the direction of motor minus handle, along which the
+    contact acts. Without a gap: the unchanged model and a direction of zeros."""
     along = driven_axes(model)[:, axis]
     if values["gap"] <= 0:
         return model, np.zeros_like(along)
@@ -78,11 +86,14 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[Mechanic
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """(3,): gap, contact stiffness, contact damping."""
     return np.array([values["gap"], *_motor_and_contact(model, axis, values)[1:]])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Gaps whose simulated impacts match the residual's spectrum best: the waveform of impacts cannot be predicted."""
+    """The two gaps whose simulated impacts match the residual's spectrum best (mean squared log ratio). Spectra are
+    compared because the waveform of impacts cannot be predicted. The tried gaps scale with the rms travel that the
+    command would give the free motor at 10 Hz."""
     motor, stiffness, damping = _motor_and_contact(evidence.model, axis, {})
     rest = {"motor_mass": motor, "contact_stiffness": stiffness, "contact_damping": damping}
     kept = _weakest_and_strongest_part(evidence, axis)
@@ -101,7 +112,8 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _weakest_and_strongest_part(evidence: Evidence, axis: int) -> list[slice]:
-    """Two excerpts: where the axis is driven most weakly, and where most strongly."""
+    """Two excerpts of `TRIED_S`: with the least command power above a thousandth of the largest, and with the
+    largest."""
     length = min(int(TRIED_S * evidence.sample_rate_hz), len(evidence.command))
     power = np.cumsum(np.append(0.0, evidence.command[:, axis] ** 2 * evidence.used))
     firsts = np.arange(0, len(evidence.command) - length + 1, max(length // 4, 1))
@@ -111,6 +123,7 @@ def _weakest_and_strongest_part(evidence: Evidence, axis: int) -> list[slice]:
 
 
 def _simulate_part(evidence: Evidence, axis: int, values: Values | None, kept: slice) -> FloatArray:
+    """(samples, p): simulated response to an excerpt of the commands; values: of the backlash, None = without it."""
     placed = () if values is None else (PlacedEffect(EFFECT, (axis,), values),)
     bodies = bodies_of(evidence.model, placed)
     commands = evidence.command[kept]
@@ -122,6 +135,7 @@ def _simulate_part(evidence: Evidence, axis: int, values: Values | None, kept: s
 
 
 def _spectrum(evidence: Evidence, signal: FloatArray) -> FloatArray:
+    """(lines, p): power spectral density without the line at frequency zero."""
     window = max(int(BAND_S * evidence.sample_rate_hz), 16)
     return spectral_density(signal, evidence.sample_rate_hz, window)[1][1:]
 

@@ -1,4 +1,7 @@
-"""Gravity torque: the weight of a body off its axis of rotation, as of a pendulum."""
+"""Gravity torque of a body whose centre of mass is off its axis of rotation, as of a pendulum (unbalanced rotor).
+
+tau = -torque sin(x + angle), with torque = m g r (N m) and x the rotation angle (rad). For rotational models only.
+"""
 
 import numpy as np
 
@@ -10,12 +13,14 @@ from equalizer.effects.starts.starting_values import axis_motion, regress_beside
 from equalizer.signals.signal import FloatArray
 
 LEAST_TRAVEL_RAD = 0.5
-"""Least travel in radians: below it, gravity torque and a spring cannot be distinguished."""
+"""Least travel (rad): below it, sin(x + angle) is nearly linear in x, so that gravity and a spring cannot be
+distinguished."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean of the torque at the step's start and end; the angle at the end depends on the torque (implicit step)."""
+    """Mean of the torques at start and end of the step (trapezoidal rule). The angle at the end depends on that mean:
+    it is found by fixed-point iteration. parameters: torque, angle; at: see `instant`."""
     start, torque = np.sin(at[X] + parameters[1]), 0.0
     for _ in range(4):
         torque = -0.5 * parameters[0] * (start + np.sin(at[X_FREE] + at[X_PER_N] * torque + parameters[1]))
@@ -24,6 +29,8 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Starting values by linear regression of the missing torque on -sin(x) and -cos(x), whose factors are
+    torque cos(angle) and torque sin(angle). Empty for translational models and for small travel."""
     motion = axis_motion(evidence, axis)
     if not evidence.model.rotational or not np.ptp(motion.position) > LEAST_TRAVEL_RAD:
         return ()

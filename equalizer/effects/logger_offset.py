@@ -1,4 +1,8 @@
-"""Time offset of a logger: the response comes late or early by a constant, the position does not."""
+"""Constant time offset between two data loggers: the response is recorded late or early, the position is not.
+
+y(t) = x(t - offset). The offset may be a fraction of a sample; the logger may have interpolated linearly between
+samples, which attenuates high frequencies.
+"""
 
 import numpy as np
 
@@ -9,18 +13,20 @@ from equalizer.effects.starts.response_starts import lateness
 from equalizer.signals.signal import FloatArray
 
 LONGEST_S = 1.0
-"""Largest offset between the loggers (s), either way. By hand."""
+"""Largest offset between the loggers (s), of either sign. By hand."""
 LEAST_SAMPLES = 1e-3
-"""Least offset that is tried, in samples; below it the correlation gives no start worth a fit. By hand."""
+"""Least offset that is tried (samples): below it, the estimate by cross-correlation is not worth a fit. By hand."""
 
 
 def _read_shifted(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
-    """(n, c) from (n, c), read `offset` seconds earlier. `interpolated`: share (0 to 1) of linear interpolation with
-    which the logger read between its samples; the rest is band-limited."""
+    """The response (n, c), delayed by `offset` seconds. `interpolated`: share (0 to 1) of linear interpolation between
+    samples; the rest is band-limited (windowed sinc). `channels` is not used: all are delayed alike."""
     return read_other_times(response, 1.0, -values["offset"] * sample_rate_hz, values.get("interpolated", 0.0))
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """Starting values: the lag of the measured response behind the predicted one, by cross-correlation weighted with
+    the noise, with linear and with band-limited interpolation, that of the smaller misfit first."""
     if channel > 0:
         return ()
     weight = evidence.used[:, None] / evidence.noise
@@ -28,13 +34,13 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     late = lateness(evidence.response * weight, evidence.predicted * weight, longest)
     if abs(late) <= LEAST_SAMPLES:
         return ()
-    # Linear interpolation between samples lowers peaks where band-limited interpolation does not: both are tried.
+    # Linear interpolation between samples attenuates high frequencies, band-limited interpolation does not.
     starts = [{"offset": late / evidence.sample_rate_hz, "interpolated": straight} for straight in (0.0, 1.0)]
     return tuple(sorted(starts, key=lambda values: _misfit(evidence, values)))
 
 
 def _misfit(evidence: Evidence, values: Values) -> float:
-    """Sum of squared residuals, in units of the noise, of the shifted prediction over the samples in use."""
+    """Sum of squared residuals of the shifted prediction over the samples in use, in units of the noise."""
     read = _read_shifted(evidence.predicted, evidence.sample_rate_hz, (), values)
     return float(np.sum((((evidence.response - read) / evidence.noise) ** 2)[evidence.used > 0]))
 

@@ -1,4 +1,7 @@
-"""Pose-dependent inertia: a mass that changes with position, as of a linkage."""
+"""Pose-dependent inertia: a mass that changes with position, as that of a linkage.
+
+With the mass M (1 + per_m x), Lagrange's equation adds -per_m M (x dv/dt + v^2 / 2) to the force on the axis.
+"""
 
 import numpy as np
 
@@ -12,12 +15,13 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 LAGRANGE = 0.5
-"""Share of M per_m v^2 that Lagrange's equation gives for a mass that depends on position."""
+"""Factor of M per_m v^2 by Lagrange's equation; the default of `speed_share`."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Uses the step's mean acceleration, which depends on the force itself (implicit step)."""
+    """Force (N) at mid-step. The mean acceleration depends on the force itself: an implicit step, linear in the force.
+    parameters: per_m M, speed_share."""
     middle, speed = 0.5 * (at[X] + at[X_FREE]), 0.5 * (at[V] + at[V_FREE])
     more = parameters[0] * middle
     free, per_newton = (at[V_FREE] - at[V]) / at[STEP_S], at[V_PER_N] / at[STEP_S]
@@ -25,11 +29,14 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """(2,): per_m times the mass along the axis, and speed_share."""
     mass = value_along(model.mass, driven_axes(model)[:, axis])
     return np.array([values["per_m"] * mass, values.get("speed_share", LAGRANGE)])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """per_m by regression of the missing force: with both terms free where their ratio is plausible (below 1.5), and
+    with the ratio of Lagrange's equation."""
     motion = axis_motion(evidence, axis)
     mass = value_along(evidence.model.mass, driven_axes(evidence.model)[:, axis])
     by_place, by_speed = -mass * motion.position * motion.acceleration, -mass * motion.velocity**2

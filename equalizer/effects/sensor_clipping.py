@@ -1,4 +1,9 @@
-"""Sensor clipping: readings are limited to the sensor's range."""
+"""Sensor clipping (saturation): readings are limited to the sensor's range.
+
+    y = max(-limit, min(x, limit))        x: true signal, y: reading, limit: in the unit of the response
+
+The mechanism is not affected: the response is clipped after the simulation.
+"""
 
 import math
 
@@ -13,12 +18,15 @@ from equalizer.signals.signal import FloatArray
 def _clip_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
+    """The response (n, p) with the chosen channels clipped at +-limit; the sample rate has no influence."""
     read = response.copy()
     read[:, channels] = np.clip(response[:, channels], -values["limit"], values["limit"])
     return read
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """The limit, below the predicted peak, that brings the predicted response closest to the measured one; empty where
+    no limit does better than none."""
     peak = float(np.abs(evidence.predicted[:, list(channels_of(evidence, channel))]).max())
     if peak == 0:
         return ()

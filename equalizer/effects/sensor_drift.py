@@ -1,4 +1,12 @@
-"""Sensor drift: the zero of a sensor moves slowly during a recording, as while it warms up."""
+"""Sensor drift: the zero offset of a sensor moves slowly during a recording, for example while the sensor warms up.
+
+The drift is a parabola over the recording's length, added to the response x:
+
+    y = x + total (start + s + 4 bend s (1 - s)),    s from 0 at the first sample to 1 at the last.
+
+`total` is the change of the offset from beginning to end, in the response's unit; `bend` the deviation from a straight
+line in the middle, and `start` the offset at the beginning, both relative to `total`.
+"""
 
 import numpy as np
 
@@ -8,17 +16,19 @@ from equalizer.effects.starts.response_starts import shares_of
 from equalizer.signals.signal import FloatArray
 
 LEAST_SIGMA = 5.0
-"""Least drift in its standard errors for it to be tried."""
+"""Least linear drift, in its standard errors, for the effect to be tried."""
 STEEPEST = 3.0
-"""Bounds of the quadratic term and of the offset at the beginning, as shares of the total drift."""
+"""Bounds of the magnitudes of `bend` and `start`, relative to the total drift."""
 
 
 def _drift_shape(samples: int, bend: float, start: float = 0.0) -> FloatArray:
+    """(samples,): the drift relative to its total."""
     share = np.linspace(0.0, 1.0, samples)
     return np.asarray(start + share + 4 * bend * share * (1 - share))
 
 
 def _add_drift(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
+    """(n, p): the response with the drift added to these channels."""
     read = response.copy()
     shape = _drift_shape(len(response), values.get("bend", 0.0), values.get("start", 0.0))
     read[:, channels] += (values["total"] * shape)[:, None]
@@ -26,12 +36,15 @@ def _add_drift(response: FloatArray, sample_rate_hz: float, channels: tuple[int,
 
 
 def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """Starting values from the residual by linear least squares: with and without a quadratic term; none where the
+    linear drift is not significant."""
     residual, n = (evidence.response - evidence.predicted)[:, channel], len(evidence.response)
     basis = np.column_stack([_drift_shape(n, 0.0), _drift_shape(n, 1.0) - _drift_shape(n, 0.0), np.ones(n)])
     total, middle, first = shares_of(residual, basis, evidence.used).tolist()
     straight, zero = shares_of(residual, basis[:, [0, 2]], evidence.used).tolist()
     size = float(np.sqrt(np.mean((residual - straight * basis[:, 0] - zero)[evidence.used > 0] ** 2)))
-    # The standard error of a slope fitted beside an offset is that of a mean times sqrt(12).
+    # With white residuals, the standard error of a slope that is fitted together with an offset, over s from 0 to 1, is
+    # sqrt(12 / n) times the residual's rms: the variance of s is 1/12.
     if abs(straight) * np.sqrt(evidence.used.sum() / 12) < LEAST_SIGMA * size:
         return ()
     return (
@@ -41,6 +54,7 @@ def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
 
 
 def _share(part: float, total: float) -> float:
+    """A part relative to the total, within the bounds; 0 where the total is 0."""
     return float(np.clip(part / total, -STEEPEST, STEEPEST)) if total else 0.0
 
 

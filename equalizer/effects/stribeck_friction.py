@@ -1,4 +1,7 @@
-"""Stribeck friction: dry friction that falls from its static to its Coulomb level as the velocity rises."""
+"""Stribeck friction: dry friction that falls from its static to its Coulomb level as the velocity rises.
+
+The force jumps at v = 0; the simulation replaces the jump by a bristle of nanometre travel (`dry_friction_kernel`).
+"""
 
 import numpy as np
 
@@ -12,14 +15,15 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 SPEEDS = np.geomspace(0.03, 1.5, 12)
-"""Stribeck velocities that are tried, over the rms velocity."""
+"""Stribeck velocities that are tried as starting values, relative to the rms velocity."""
 _MORE = 1.2
-"""Static over Coulomb friction, where the data show none."""
+"""Starting ratio of static to Coulomb friction where the data show no higher friction at low speed."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Solve for the friction at the step's mean velocity, which itself depends on the force."""
+    """Mean friction force (N) over the step, at its mean velocity. That depends on the force: at most three fixed-point
+    iterations, each from the same bristle deflection. parameters: coulomb, static, speed."""
     mean, force, start, last = at[V], 0.0, memory[0], -1.0
     for _ in range(3):
         level = parameters[0] + (parameters[1] - parameters[0]) * np.exp(-((mean / parameters[2]) ** 2))
@@ -32,10 +36,13 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """(3,): Coulomb level, static level and Stribeck velocity, the latter above zero because the law divides by it."""
     return np.array([values["coulomb"], values["static"], max(values["speed"], 1e-12)])
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Levels by regression of the missing force, at the tried Stribeck velocity that explains most. Empty where neither
+    level is positive."""
     motion = select_sliding_motion(evidence, axis)
     sign, rms = np.sign(motion.velocity), float(np.sqrt(np.mean(motion.velocity**2)))
     speed, found = best_trial(

@@ -2,7 +2,9 @@
 
     F = -depth sin(2 pi rate_hz t + phase) (D v + stiffness_share K x)
 
-D and K are the damping and stiffness of the model to the ground along the axis: those of the hand, mainly.
+D (N s/m) and K (N/m) are the model's damping and stiffness to the ground along the axis, mainly those of the hand. v
+and x are the velocity (m/s) and position (m) of the axis, t the time (s) from the start of the recording. Starting
+values: least squares of the missing force on the modulated forces, at every modulation frequency.
 """
 
 import numpy as np
@@ -18,17 +20,19 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 FASTEST_HZ, STARTS = 15.0, 2
-"""Fastest variation of a grip that is searched (tremor is slower: 8 to 12 Hz), and number of starting values."""
+"""Highest modulation frequency that is searched, above that of tremor (8 to 12 Hz); and number of starting values."""
 _POINTS_PER_LINE = 16
-"""Zero padding of the spectrum, in points per line: the rate is then found to a sixteenth of a line."""
+"""Zero padding of the spectrum: points per line (one cycle per recording), so that a frequency is found to a sixteenth
+of a line."""
 _LEAST_DENOMINATOR = 0.2
-"""Least denominator of the implicit step: keeps it positive where negative damping is strong within a step."""
+"""Least denominator of the implicit step, which strong negative damping could otherwise bring to zero or below."""
 
 
 @compile_law
 def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
     """The mean force over a step by the trapezoidal rule: F = -(d (v + v1) + k (x + x1)) / 2. The state x1, v1 at the
-    end of the step is that without the force, plus the force times what 1 N adds."""
+    end of the step is linear in F, so that the implicit equation is solved exactly: x1 = X_FREE + F X_PER_N, and alike
+    for v1. d and k are taken in the middle of the step."""
     modulation = parameters[1] * np.sin(parameters[0] * (at[TIME_S] + 0.5 * at[STEP_S]) + parameters[2])
     damping, stiffness = modulation * parameters[3], modulation * parameters[4]
     force = -0.5 * (damping * (at[V] + at[V_FREE]) + stiffness * (at[X] + at[X_FREE]))
@@ -36,8 +40,8 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 
 def value_to_ground(matrix: FloatArray, axes: FloatArray, axis: int) -> float:
-    """Damping or stiffness that ties a driven axis to the ground; attached bodies are condensed out (static
-    condensation, Guyan 1965). matrix: (n, n), axes: (n, m)."""
+    """Damping (N s/m) or stiffness (N/m) between a driven axis and the ground; coordinates on which no command acts are
+    eliminated by static condensation (Guyan 1965). matrix: (n, n), axes: (n, m)."""
     carried = np.linalg.norm(axes, axis=1) < 1e-9
     rest = matrix[np.ix_(~carried, ~carried)]
     if carried.any():
@@ -48,6 +52,7 @@ def value_to_ground(matrix: FloatArray, axes: FloatArray, axis: int) -> float:
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """(5,): the parameters of `_law`: rad/s, depth, phase in rad, D, and stiffness_share K."""
     axes = driven_axes(model)
     damping, stiffness = value_to_ground(model.damping, axes, axis), value_to_ground(model.stiffness, axes, axis)
     turning, share = 2 * np.pi * values["rate_hz"], values.get("stiffness_share", 0.0)
@@ -55,6 +60,7 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Starting values from the likeliest modulation frequencies, the best fit first."""
     sites = range(evidence.model.inputs) if axis == ALL_SITES else (axis,)
     n, rate = len(evidence.command), evidence.sample_rate_hz
     force, damping_force = np.zeros((n, len(sites))), np.zeros((n, len(sites)))
@@ -80,6 +86,9 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _grip_values(rate_hz: float, strengths: FloatArray) -> Values:
+    """Parameters from the weights of the damping force times sine and cosine, then the spring force times these. The
+    stiffness share is the projection of the spring force's modulation on that of the damping force, limited to the
+    range of the parameter."""
     sine, cosine, stiff_sine, stiff_cosine = strengths.tolist()
     depth = float(np.hypot(sine, cosine))
     share = (stiff_sine * sine + stiff_cosine * cosine) / max(depth**2, np.finfo(float).tiny)
@@ -89,7 +98,7 @@ def _grip_values(rate_hz: float, strengths: FloatArray) -> Values:
 
 
 def _slow_lines(samples: FloatArray, size: int, count: int) -> ComplexArray:
-    """The first `count` lines of the DFT of samples zero-padded to `size`."""
+    """The first `count` lines of the DFT of samples zero-padded to `size`, without computing the others."""
     # Bluestein's chirp transform (Rabiner, Schafer and Rader 1969, Bell Syst. Tech. J. 48:1249).
     n, last = len(samples), max(len(samples), count)
     chirp = np.exp(-1j * np.pi / size * np.arange(last) ** 2)
@@ -100,11 +109,11 @@ def _slow_lines(samples: FloatArray, size: int, count: int) -> ComplexArray:
 
 
 def _likely_rates(force: FloatArray, damping_force: FloatArray, rate: float) -> list[float]:
-    """Likeliest modulation frequencies in Hz: regression of the missing force on the modulated damping force, at every
-    frequency."""
+    """Likeliest modulation frequencies in Hz, by the power that a regression of the missing force on the damping force
+    (1, sine, cosine) explains at each frequency. force, damping_force: (n, sites); rate: of the samples, in Hz."""
     n = len(force)
     size = _POINTS_PER_LINE * n
-    # The square is needed at twice the frequency, which must stay below half of the sampling rate.
+    # The products of sine and cosine contain twice the frequency, which must stay below half of the sample rate.
     last = min(int(FASTEST_HZ / rate * size), size // 4)
     against = np.conj(_slow_lines(np.sum(force * damping_force, axis=1), size, last + 1))
     square = np.conj(_slow_lines(np.sum(damping_force**2, axis=1), size, 2 * last + 1))
@@ -116,8 +125,10 @@ def _likely_rates(force: FloatArray, damping_force: FloatArray, rate: float) -> 
     normal[:, 1, 1], normal[:, 2, 2] = (whole - twice.real) / 2, (whole + twice.real) / 2
     normal[:, 1, 2] = normal[:, 2, 1] = twice.imag / 2
     columns = np.stack([np.full(last + 1, against[0].real), against.imag, against.real], axis=1)
+    # Ridge: near zero frequency the cosine equals the constant.
     normal += 1e-6 * whole * np.eye(3)
     power = np.sum(columns * np.linalg.solve(normal, columns[:, :, None])[:, :, 0], axis=1)
+    # Less than one cycle per recording is not distinguishable from a constant grip.
     power[:_POINTS_PER_LINE] = -np.inf
     rates = []
     for _ in range(STARTS):

@@ -1,8 +1,9 @@
-"""The three mirror lines of a delta linkage: what they say of readings, and what they fill in.
+"""Mirror symmetry of a delta linkage: a test of calibration readings, and a way to complete them.
 
-Each arm's plane (through the base's axis x) is a mirror R of the linkage: at the mirrored position the inertia is
-R M R, the Jacobian R J P and the joint angles P q, where P swaps the other two joints. Two directions mirrored about
-such a plane meet the same mass on it, which is why the study's two directions lie so.
+The plane of each arm, which contains the base's axis x, is a plane of symmetry with the reflection R: at the mirrored
+position the inertia is R M R, the Jacobian R J P and the joint angles P q, where P swaps the other two joints. A mirror
+line is where such a plane meets the plane y-z. At a position in the plane, two directions that are mirror images have
+the same apparent mass; the study's two directions were chosen so.
 """
 
 import numpy as np
@@ -11,26 +12,28 @@ from equalizer.linkage.calibration import LinkageReading
 from equalizer.signals.signal import FloatArray
 
 WARN_FROM = 0.02
-"""Relative difference of inertia: moves an acceleration by 2 %, a fifth of the staircases' finest step (1 dB)."""
+"""Relative difference of inertia from which a warning is given. It changes an acceleration by 2 % (0.17 dB), a small
+part of the staircases' finest step (1 dB)."""
 
 NEAR_M = 1e-6
-"""Distance below which two positions are the same."""
+"""Distance (m) below which two positions count as the same."""
 ODD_SHARE = 0.5
-"""Share of the others' asymmetry below which a mirror line is valid, so that its own arm is the one that differs."""
+"""Fraction of the other lines' asymmetry below which a mirror line counts as valid; the arm in that line is then the
+arm that differs from the others."""
 UPRIGHT = 1e-3
 """Largest y component of a line's direction for it to count as upright: gravity then lies in its mirror plane."""
 
 
 def reflection(azimuth_rad: float) -> FloatArray:
-    """(3, 3), about the plane through x at this azimuth."""
+    """(3, 3): reflection about the plane that contains the axis x and has this azimuth, from y towards z."""
     across = np.array([0.0, -np.sin(azimuth_rad), np.cos(azimuth_rad)])
     mirror: FloatArray = np.eye(3) - 2 * np.outer(across, across)
     return mirror
 
 
 def line_asymmetry(readings: list[LinkageReading], azimuths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """For each line, (3,): largest |M(R p) - R M(p) R| over |M(p)| (spectral norms) of all readings with a mirror
-    image, 0 without any; and positions (3, 3) where it is largest, m."""
+    """Asymmetry of the inertia about each line, (3,): largest |M(R p) - R M(p) R| / |M(p)| (spectral norms) over the
+    readings whose mirrored position was read too, 0 without any; and the positions (3, 3), m, where it is largest."""
     worst, where = np.zeros(3), np.zeros((3, 3))
     positions = np.array([reading.position_m for reading in readings])
     for line, azimuth in enumerate(azimuths):
@@ -49,8 +52,9 @@ def line_asymmetry(readings: list[LinkageReading], azimuths: FloatArray) -> tupl
 def fill_in(
     readings: list[LinkageReading], azimuths: FloatArray, unread: FloatArray
 ) -> tuple[list[LinkageReading], FloatArray]:
-    """Readings for those positions of unread (k, 3) that one or two mirrors bring to a position that was read, and the
-    positions for which there are none. Gravity only by an upright line, NaN else."""
+    """Complete readings by symmetry: readings at those positions of unread (k, 3), m, that one reflection, or two in
+    succession, map to a position that was read; and the remaining positions (r, 3). Gravity is reflected about an
+    upright line only, and NaN otherwise."""
     filled, left = [], []
     positions = np.array([reading.position_m for reading in readings])
     once = [(line,) for line in range(3)]
@@ -72,7 +76,7 @@ def fill_in(
 
 
 def asymmetry_words(asymmetry: FloatArray, where_m: FloatArray, line_deg: FloatArray) -> tuple[str, ...]:
-    """Warnings; none where all lines hold."""
+    """Warnings for lines whose asymmetry exceeds `WARN_FROM`; empty if there are none."""
     warnings = [
         f"Mirrored about the line at {line_deg[line]:.0f} degrees the inertia differs by up to {asymmetry[line]:.1%}, "
         f"most at ({', '.join(f'{1000 * each:.0f}' for each in where_m[line])}) mm; up to {WARN_FROM:.0%} is rounding "
@@ -90,12 +94,14 @@ def asymmetry_words(asymmetry: FloatArray, where_m: FloatArray, line_deg: FloatA
 
 
 def _nearest(positions: FloatArray, wanted: FloatArray) -> int | None:
+    """Index of the position that equals `wanted` within `NEAR_M`; None without one."""
     distances = np.linalg.norm(positions - wanted, axis=1)
     nearest = int(np.argmin(distances))
     return nearest if distances[nearest] < NEAR_M else None
 
 
 def _mirror_reading(reading: LinkageReading, line: int, azimuth_rad: float) -> LinkageReading:
+    """The reading at the position mirrored about this line."""
     mirror = reflection(azimuth_rad)
     swapped = [line if joint == line else 3 - line - joint for joint in range(3)]
     upright = abs(np.cos(azimuth_rad)) < UPRIGHT

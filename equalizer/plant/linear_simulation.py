@@ -1,4 +1,9 @@
-"""A mechanical model's linear part: exact zero-order-hold discretisation by the matrix exponential, and its poles."""
+"""Linear part of a mechanical model: exact zero-order-hold discretisation by the matrix exponential, and its poles.
+
+M q'' + D q' + K q = B u + P f has the state x = (q, v) and x' = F x + G (u, f), with commands u and forces f at the
+ports P. With both held constant over a step T, x[k+1] = A x[k] + H (u, f)[k], where [A H] are the upper rows of
+exp([[F, G], [0, 0]] T) (Van Loan, IEEE Trans. Autom. Control 23:395, 1978). SI units.
+"""
 
 from dataclasses import dataclass
 
@@ -11,41 +16,41 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearSteps:
-    """Matrices of one step. State (q, v), 2n numbers; inputs are the m commands and forces at r ports, the driven axes
-    first."""
+    """Matrices of one step. The state (q, v) has 2n numbers for n coordinates; inputs are the m commands and the forces
+    at r ports, both held during the step. There are p responses."""
 
     step_s: float
     advance: FloatArray
-    """(2n, 2n)"""
+    """(2n, 2n): the state after the step by the state before."""
     by_command: FloatArray
-    """(2n, m)"""
+    """(2n, m): the state after the step by the commands."""
     by_axis_force: FloatArray
-    """(2n, r): of 1 N at each port."""
+    """(2n, r): the state after the step by a force of 1 N (torque of 1 N m) at each port."""
     motion: FloatArray
-    """(3 r, 2n): the ports' positions, velocities and accelerations."""
+    """(3 r, 2n): first the positions of all ports, then their velocities, then their accelerations, by the state."""
     motion_by_command: FloatArray
-    """(3 r, m)"""
+    """(3 r, m): direct effect of the commands on them; not zero for accelerations only."""
     motion_by_axis_force: FloatArray
-    """(3 r, r)"""
+    """(3 r, r): direct effect of the port forces on them."""
     response: FloatArray
     """(p, 2n): the response, in the quantity of the model."""
     response_by_command: FloatArray
-    """(p, m)"""
+    """(p, m): direct effect of the commands on the response; not zero for an acceleration only."""
     response_by_axis_force: FloatArray
-    """(p, r)"""
+    """(p, r): direct effect of the port forces on the response."""
     position: FloatArray
-    """(p, 2n)"""
+    """(p, 2n): the response's position by the state, independent of the quantity of the model."""
 
 
 def driven_axes(model: MechanicalModel) -> FloatArray:
-    """(n, m): the direction in the coordinates along which each command drives; length 1."""
+    """(n, m): unit vector in the coordinates along which each command drives; 0 for a command that drives nothing."""
     length = np.linalg.norm(model.input, axis=0)
     return np.asarray(model.input / np.where(length > 0, length, 1.0))
 
 
 def linear_steps(model: MechanicalModel, step_s: float, ports: FloatArray | None = None) -> LinearSteps:
-    """Discretises the structure without actuator, sensor and effects. ports: (n, r), the directions in the coordinates
-    along which forces act and motion is output; the driven axes where none are given."""
+    """Discretise the structure without actuator, sensor and effects, with a step in s. ports: (n, r), the directions in
+    the coordinates along which forces act and motion is output; None = the driven axes."""
     n, m = model.coordinates, model.inputs
     axes = driven_axes(model) if ports is None else ports
     inputs = np.asarray(np.linalg.solve(model.mass, np.hstack([model.input, axes])), dtype=np.float64)
@@ -78,7 +83,8 @@ def linear_steps(model: MechanicalModel, step_s: float, ports: FloatArray | None
 def _output_rows(
     output: FloatArray, order: int, from_state: FloatArray, inputs: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """An output's `order`-th derivative: its rows for the state, (p, 2n), and for the inputs, (p, 2m)."""
+    """Rows of the `order`-th time derivative (0 to 2) of the outputs (p, n) of the coordinates: for the state,
+    (p, 2n), and for the inputs, (p, m + r). Only the acceleration depends on the inputs directly."""
     nothing, directly = np.zeros_like(output), np.zeros((len(output), inputs.shape[1]))
     if order == 0:
         return np.hstack([output, nothing]), directly
@@ -88,7 +94,7 @@ def _output_rows(
 
 
 def free_motion_rates(model: MechanicalModel) -> ComplexArray:
-    """(2 coordinates,): eigenvalues of the model, 1/s; complex ones come in conjugate pairs."""
+    """(2n,): eigenvalues of the continuous-time state matrix (poles), 1/s; complex ones come in conjugate pairs."""
     n = model.coordinates
     motion = np.block(
         [
@@ -100,5 +106,5 @@ def free_motion_rates(model: MechanicalModel) -> ComplexArray:
 
 
 def growth_rate(model: MechanicalModel) -> float:
-    """Largest real part of the model's eigenvalues, 1/s; negative where all free motion decays."""
+    """Largest real part of the model's poles, 1/s; negative where all free motion decays."""
     return float(free_motion_rates(model).real.max())

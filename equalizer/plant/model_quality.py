@@ -11,8 +11,8 @@ NOT_STORED = "Quality not stored: the model file is of an earlier version; ident
 
 @dataclass(frozen=True, slots=True)
 class ModelQuality:
-    """Root-mean-square errors in the model's band, relative to the response. Raises ValueError for impossible
-    figures."""
+    """Root-mean-square errors in the model's band, as fractions of the response. Raises ValueError for a negative or
+    non-finite figure."""
 
     expected_error: float
     """Error of the model against the device, exceeded in 5 % of cases on recordings like these; not smaller than any
@@ -27,7 +27,7 @@ class ModelQuality:
     held_out_noise: float | None = None
     """Noise of the held-out record; None = not known."""
     held_out_s: float | None = None
-    """Length of the held-out record."""
+    """Length of the held-out record, s; None = there was none."""
     remarks: tuple[str, ...] = ()
     """Likely causes of the error, as sentences."""
 
@@ -45,8 +45,9 @@ def model_quality(
     remarks: tuple[str, ...] = (),
     most_misfit: float = 0.0,
 ) -> ModelQuality:
-    """The quality of a model from its misfit, its scatter and its held-out error. held_out: error, noise, seconds; the
-    stated error is at least the held-out one. most_misfit: misfit that the noise of the fitted lines may hide."""
+    """The quality of a model. The expected error is the root of the summed squares of misfit and scatter, and at least
+    the held-out error. held_out: error, noise, and length of the record (s). most_misfit: misfit that the noise of the
+    fitted lines may hide; used in place of a smaller misfit_error."""
     own = float(np.hypot(max(misfit_error, most_misfit), scatter_error or 0.0))
     error, noise, seconds = held_out or (None, None, None)
     return ModelQuality(max(own, error or 0.0), misfit_error, scatter_error, error, noise, seconds, remarks)
@@ -84,6 +85,6 @@ def quality_brief(quality: ModelQuality | None) -> str:
 
 
 def worst_quality(found: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
-    """Largest expected error of several models, or None where that of one is not known."""
+    """The quality with the largest expected error of several models; None if there are none or a quality is unknown."""
     known = [quality for quality in found if quality is not None]
     return max(known, key=lambda quality: quality.expected_error) if len(known) == len(found) and known else None

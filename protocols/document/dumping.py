@@ -1,4 +1,7 @@
-"""A protocol back to plain values and to TOML text, with every default written out."""
+"""Serialisation of a protocol to plain values and to TOML text, the inverse of `loading`.
+
+Every default is written out, so that the text states all settings by itself.
+"""
 
 import json
 from typing import Any
@@ -9,17 +12,19 @@ from protocols.document.schema import ADAPTERS
 
 
 def protocol_values(protocol: StudyProtocol | RecordingProtocol) -> dict[str, Any]:
-    """Plain values as JSON has them, defaults filled in; `loading.protocol_from_values` takes them back."""
+    """Plain values (JSON types) with all defaults filled in; `loading.protocol_from_values` is the inverse."""
     values: dict[str, Any] = ADAPTERS[protocol.kind].dump_python(protocol, mode="json")
     return values
 
 
 def dump_protocol(protocol: StudyProtocol | RecordingProtocol) -> str:
-    """TOML text; `loading.load_protocol` reads the same protocol from it."""
+    """TOML text with all defaults; `loading.load_protocol` reads an equal protocol from it."""
     return _table("", protocol_values(protocol)).lstrip("\n")
 
 
 def _table(path: str, values: dict[str, Any], header: str = "") -> str:
+    """TOML text of a table: its header, its plain keys, then its sub-tables, because TOML assigns each key to the
+    header above it. path: dotted name of the table, empty for the document."""
     plain = {key: value for key, value in values.items() if not _holds_tables(value)}
     text = (f"\n{header}\n" if header else "") + "".join(f"{key} = {_value(value)}\n" for key, value in plain.items())
     for key, value in values.items():
@@ -32,15 +37,17 @@ def _table(path: str, values: dict[str, Any], header: str = "") -> str:
 
 
 def _holds_tables(value: Any) -> bool:
+    """Whether a value is written under headers of its own: a table, or a list of tables."""
     return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(entry, dict) for entry in value))
 
 
 def _value(value: Any) -> str:
+    """A value other than a table as TOML text."""
     match value:
         case bool():
             return str(value).lower()
         case str():
-            # TOML's basic strings are JSON's, but for the delete character and escaped surrogates.
+            # TOML's basic strings are JSON's, except that TOML forbids a bare delete character and escaped surrogates.
             return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         case list():
             return f"[{', '.join(_value(entry) for entry in value)}]"

@@ -1,4 +1,8 @@
-"""Hash of a protocol: equal for equal values, independent of the file's formatting."""
+"""Hash of a protocol: identifies the settings of a study, independent of the formatting of its file.
+
+Sessions and locks store it, so that a changed protocol is detected. Settings that were added to the format later enter
+the hash only where they differ from their defaults: the tables `*_SINCE` list them, and old hashes stay valid.
+"""
 
 import hashlib
 import json
@@ -21,6 +25,7 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import protocol_values
 
 Untouched = str | float | bool | list[Any] | dict[str, Any]
+"""A default value as JSON has it."""
 
 TABLES_SINCE = {
     "consent": ConsentSettings(),
@@ -42,17 +47,22 @@ TABLES_SINCE = {
 the hash, so that old hashes stay valid."""
 
 SAFETY_SINCE: dict[str, Untouched] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": UNTOUCHED}
+"""Safety settings added later, in study and recording protocols, by path, with their defaults. Force in N."""
 
 ROVE_SINCE: dict[str, Untouched] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0, "stimulus.rove_db": 0.0}
+"""Roving of the level (dB, random variation) in demonstration, practice and test, added later."""
 
 TIMING_SINCE: dict[str, Untouched] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
+"""Limits on late ticks of the control loop added later."""
 
 SENSOR_SINCE: dict[str, Untouched] = {
     "measurement.lost_packets_limit": 0.05,
     "measurement.accelerometer_needed": False,
 }
+"""Requirements on the accelerometer added later."""
 
 SETUP_SINCE: dict[str, Untouched] = {"setup.daily_check_needed": False}
+"""Requirement of a daily device check, added later."""
 
 QUESTIONS_SINCE: dict[str, Untouched] = {
     "debrief.codes": [],
@@ -61,9 +71,12 @@ QUESTIONS_SINCE: dict[str, Untouched] = {
     "debrief.scale": [],
     "debrief.ends": [],
 }
+"""Kinds of answers to the questions of the debriefing added later; each path stands for all questions."""
 DECLARED_SINCE: dict[str, Untouched] = {"analysis.interval": "undeclared"}
+"""Declaration of the confidence interval, added later."""
 
 PLACEMENT_SINCE: dict[str, Untouched] = {"staircase.bayesian": {"trials": 0, "spread_db": 0.0}}
+"""Bayesian placement of levels, added later; off by default."""
 
 FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
     "study": {
@@ -80,14 +93,16 @@ FIELDS_SINCE: dict[str, dict[str, Untouched]] = {
     },
     "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
 }
-"""The same for single fields, for each kind of protocol; `segments.role` is that of every segment."""
+"""Fields added after the first locks and sessions, with their default values, by kind of protocol and dotted path. A
+path through a list, such as `segments.role`, applies to every entry."""
 
 
 def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
-    """SHA-256, 64 hexadecimal digits, of all values, defaults included.
+    """SHA-256 (64 hexadecimal digits) of all values as canonical JSON: keys sorted, no white space, no NaN.
 
-    Comments, the order of keys, and whether a default is written out make no difference. The title and the source
-    count: they, too, are what was fixed before data came in.
+    Comments, the order of keys, and whether a default is written out make no difference. Title and source
+    do, because they are fixed before the data as well. Defaults are included, except those of later settings
+    (`*_SINCE`).
     """
     values = protocol_values(protocol)
     if isinstance(protocol, StudyProtocol):
@@ -96,7 +111,7 @@ def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
                 del values[name]
     for path, untouched in FIELDS_SINCE[protocol.kind].items():
         _leave_out(values, path.split("."), untouched)
-    # JSON writes 0.0 and -0.0 apart, though the values are equal.
+    # JSON writes 0.0 and -0.0 differently, though the values are equal; adding 0.0 turns -0.0 into 0.0.
     text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
     plain = json.loads(text, parse_float=lambda digits: float(digits) + 0.0)
     canonical = json.dumps(plain, sort_keys=True, separators=(",", ":"), allow_nan=False)
@@ -104,7 +119,8 @@ def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
 
 
 def _leave_out(values: Any, path: list[str], untouched: Untouched) -> None:
-    """Remove the field, in all entries of a list, where it has its default value."""
+    """Delete the field at a path from nested values, in place, where it has its default value; in each entry of a
+    list."""
     if isinstance(values, list):
         for entry in values:
             _leave_out(entry, path, untouched)

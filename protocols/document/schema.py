@@ -1,6 +1,7 @@
-"""JSON Schema of protocol files, and what it allows at any place of one.
+"""JSON Schema of protocol files, and the values that it allows at each place of a file, in words.
 
-The schema is made from the code: key names, bounds, defaults and reasons are written once, in the dataclasses.
+The schema is generated from the dataclasses of `protocols.definition`, the only place where key names, bounds, defaults
+and reasons are written. Documentation and error messages use these functions.
 """
 
 from functools import cache
@@ -20,7 +21,7 @@ ADAPTERS: dict[str, TypeAdapter[Any]] = {
     "study": TypeAdapter(StudyProtocol),
     "recording": TypeAdapter(RecordingProtocol),
 }
-"""One for each `kind` of protocol."""
+"""Pydantic adapter of each `kind` of protocol, which validates, serialises and describes it."""
 
 UNITS = {
     "n": "newtons",
@@ -33,12 +34,12 @@ UNITS = {
     "m_per_s": "m/s",
     "mps2": "m/s²",
 }
-"""Unit by the suffix of a key."""
+"""Unit in words, by the suffix of a key after an underscore."""
 
 
 @cache
 def protocol_schema(kind: str) -> Node:
-    """JSON Schema of a protocol of this kind, "study" or "recording"."""
+    """JSON Schema of a protocol of this kind, "study" or "recording". Raises KeyError for another kind."""
     return ADAPTERS[kind].json_schema()
 
 
@@ -51,7 +52,7 @@ def node_at(root: Node, place: Place) -> Node | None:
 
 
 def keys_of(root: Node, node: Node) -> tuple[str, ...]:
-    """The keys of a table, in the order in which they are documented."""
+    """The keys of a table in the order of the dataclass's fields; empty for another value than a table."""
     return tuple(resolve_reference(root, node).get("properties", {}))
 
 
@@ -64,7 +65,7 @@ def resolve_reference(root: Node, node: Node) -> Node:
 
 
 def describe_allowed(root: Node, node: Node, key: str = "") -> str:
-    """Allowed values in words. key: its suffix tells the unit."""
+    """Allowed values in words. key: name of the value, whose suffix determines the unit (`UNITS`)."""
     node = resolve_reference(root, node)
     if "oneOf" in node:
         return f"a table whose {node['discriminator']['propertyName']} is {_choices(node['discriminator']['mapping'])}"
@@ -86,7 +87,7 @@ def describe_allowed(root: Node, node: Node, key: str = "") -> str:
 
 
 def unit_of(key: str) -> str:
-    """ ", in newtons" for `start_n`; nothing for a key without a unit."""
+    """Unit of a key in words, such as ", in newtons" for `start_n`; empty for a key without a unit."""
     for suffix, unit in sorted(UNITS.items(), key=lambda item: -len(item[0])):
         if key.endswith(f"_{suffix}"):
             return f", in {unit}"
@@ -94,6 +95,8 @@ def unit_of(key: str) -> str:
 
 
 def _child_node(root: Node, node: Node, part: str | int) -> Node | None:
+    """Schema of an entry of a list (`part`: its index), of a key of a table, or of the member of a union that the
+    discriminator's value `part` selects; None where there is no such schema."""
     node = resolve_reference(root, node)
     if isinstance(part, int):
         return node.get("items")

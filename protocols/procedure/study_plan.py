@@ -1,8 +1,9 @@
-"""Who has taken part in a study, and which orders of the frequencies are still needed for a balanced sample.
+"""Progress of a study's participants, and the orders of the frequencies that a balanced sample still needs.
 
-A participant's number decides the row of a Williams design and whether the labels are swapped (`schedule`). Both come
-round again after a cycle of participants, whose places are the cells of the design. A sample of n participants fills
-the cells in turn; a cell whose participant withdrew or never finished stays short, because numbers are given once.
+The order of the frequencies is counterbalanced by a Williams design (`schedule.williams_rows`). A participant's number
+determines the row of the design and whether the labels 1 and 2 of the directions are swapped. Both repeat after a cycle
+of participants; each place of the cycle is a cell of the design. A sample of n participants fills the cells in turn. A
+cell whose participant withdrew or did not finish lacks a participant, because a number is never assigned again.
 """
 
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.schedule import frequency_order, labels_swapped, williams_rows
 
 Progress = Literal["done", "begun", "left out"]
+"""Whether a participant finished, has begun, or does not count towards the sample."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,64 +23,71 @@ class Participant:
 
     code: str
     number: int | None
-    """The place in the balanced order, from 0; None where none was taken."""
+    """Place in the balanced order, from 0; None where none was assigned."""
     progress: Progress
     why: str = ""
-    """Status of a participant who is left out: refused, excluded, withdrawn, unreadable."""
+    """Reason why a participant is left out, such as refused, excluded, withdrawn or unreadable; else empty."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One order of the frequencies, with one labelling of the directions."""
+    """One order of the frequencies, with one labelling of the directions, and its numbers of participants."""
 
     frequencies_hz: tuple[float, ...]
+    """Frequencies in the order of their runs; empty where the order is drawn at random."""
     swapped: bool
-    """Whether the numbers 1 and 2 change places."""
+    """Whether the labels 1 and 2 of the directions are swapped."""
     wanted: int
-    """Participants of the whole sample."""
+    """Participants that the whole sample requires in this cell."""
     done: int
+    """Participants who have finished."""
     begun: int
+    """Participants who have begun and not finished."""
 
     @property
     def needed(self) -> int:
-        """Participants who have not begun."""
+        """Number of participants who still have to begin."""
         return max(0, self.wanted - self.done - self.begun)
 
 
 @dataclass(frozen=True, slots=True)
 class StudyPlan:
-    """Participants of a study so far, and the cells of its balanced design with the participants that each still
-    needs."""
+    """Participants of a study so far, and the cells of its balanced design with the number of participants that each
+    still needs."""
 
     protocol: str
+    """Name of the protocol."""
     planned: int
     """The declared sample size; 0 where none is declared."""
     participants: tuple[Participant, ...]
-    """Participants by their numbers, then those without."""
+    """Participants in the order in which they were given."""
     cells: tuple[Cell, ...]
-    """Orders of one cycle, as they are assigned; empty where orders are drawn at random or all are the same."""
+    """Cells of one cycle in the order in which they are assigned; empty where a cycle is one participant, so that
+    nothing is balanced."""
     next_number: int
     """Number of the next participant."""
 
     def count(self, progress: Progress) -> int:
-        """Number of participants with this progress, those without a place in the balanced order included."""
+        """Number of participants with this progress, including those without a place in the balanced order."""
         return sum(each.progress == progress for each in self.participants)
 
     @property
     def next_cell(self) -> Cell | None:
-        """Cell of the next participant: numbers beyond a cycle begin again at the first cell. None where `cells` is
+        """Cell of the next participant; after the last cell of the cycle, the first follows. None where `cells` is
         empty."""
         return self.cells[self.next_number % len(self.cells)] if self.cells else None
 
     @property
     def balanced_sizes(self) -> int:
-        """Samples of a multiple of this size fill all cells equally often; 1 where nothing is balanced."""
+        """Number of participants in a cycle: samples of a multiple of it fill all cells equally often; 1 where nothing
+        is balanced."""
         return max(1, len(self.cells))
 
 
 def plan_study(protocol: StudyProtocol, participants: Sequence[Participant], next_number: int) -> StudyPlan:
-    """The plan of a study: its cells with the participants that they have and need. participants: of this protocol.
-    Where no sample size is declared, the cells of the cycles begun are wanted."""
+    """The plan of a study: its cells with the numbers of participants that they have and need. participants: those of
+    this protocol; next_number: number of the next participant. Where the protocol declares no sample size, the plan
+    completes the present cycle."""
     planned = protocol.analysis.participants
     cycle = _cycle(protocol)
     sample = planned or -(-max(next_number, 1) // cycle) * cycle
@@ -87,13 +96,14 @@ def plan_study(protocol: StudyProtocol, participants: Sequence[Participant], nex
 
 
 def _cycle(protocol: StudyProtocol) -> int:
-    """Participants after whom order and labelling repeat."""
+    """Number of participants after which order and labelling repeat."""
     frequencies, settings = protocol.stimulus.frequencies_hz, protocol.schedule
     orders = len(williams_rows(len(frequencies))) if settings.order == "williams" and frequencies else 1
     return orders * (1 if settings.labels == "fixed" else 2)
 
 
 def _cell(protocol: StudyProtocol, place: int, cycle: int, sample: int, participants: Sequence[Participant]) -> Cell:
+    """The cell at this place of the cycle, with the participants of a sample of this size."""
     frequencies_hz = protocol.stimulus.frequencies_hz
     drawn = protocol.schedule.order == "random"
     here = [each for each in participants if each.number is not None and each.number % cycle == place]

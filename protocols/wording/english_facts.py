@@ -1,12 +1,12 @@
-"""Sentences that the session itself makes, and logs in English, in any language that is shown.
+"""English texts by key for sentences that a session composes itself: requests, reasons for void trials, notices.
 
-What stands in braces is filled in.
-
-A participant reads them in the language of the protocol; sentences for the experimenter alone are not among them.
+The log contains these sentences in English; the participant reads them in the language of the protocol, whose table of
+texts (`de.toml`, `es.toml`) has the same keys. A name in braces is replaced by a value, such as {seconds}. Sentences
+for the experimenter alone are not listed here.
 """
 
 FACTS: dict[str, str] = {
-    # Who asked.
+    # Requests, and who made them.
     "fact_pause": "asked for a pause",
     "fact_leave": "asked to leave",
     "fact_pause_participant": "the participant asked for a pause",
@@ -18,7 +18,7 @@ FACTS: dict[str, str] = {
     "fact_left": "the participant left",
     "fact_withdrew": "the participant withdrew",
     "fact_input_ended": "the input ended",
-    # Why a trial is void, or a sitting over.
+    # Reasons why a trial is void or a sitting ends.
     "fact_ended_early": "the stimulus ended early",
     "fact_time_limit": "no answer within the time limit",
     "fact_handle_wait": "the wait for the handle ended early",
@@ -50,7 +50,7 @@ FACTS: dict[str, str] = {
     "fact_refused": "consent was not given",
     "fact_excluded": "a question of the exclusion list was answered with yes",
     "fact_cut_short": "That was cut short: {reason}.",
-    # Titles while something plays; the handle.
+    # Titles while a stimulus plays, and instructions for the handle.
     "fact_direction": "Direction {number}",
     "fact_interval": "Interval {number}",
     "fact_no_question": "Nothing to answer: the device is measured",
@@ -59,7 +59,7 @@ FACTS: dict[str, str] = {
     "fact_hold_there": "Hold it there.",
     "fact_bring_back": "Bring the handle {distance} mm back to the centre.",
     "fact_hands_off": "Hands off: the reference plays for {seconds} s.",
-    # The set-up.
+    # Deviations of the set-up from the protocol.
     "fact_setup": "The set-up is not the protocol's: {differences}.",
     "fact_heard": "the device can be heard",
     "fact_seen": "the hand can be seen",

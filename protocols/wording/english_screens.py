@@ -1,9 +1,13 @@
-"""English texts of the screens and of line mode. Keys in `_1` are for one thing, in `_n` for any other count."""
+"""English texts of the participants' screens and of line mode (plain text in a terminal), by key.
 
-# Names in braces are filled in by the screen, and a translation keeps them. German and Spanish texts count in the hash
-# of a protocol and stay as they are.
+A key that ends in `_1` is the singular, in `_n` the form for any other count. Names in braces are placeholders that the
+program fills in; every translation has the same keys and placeholders (`in_language`).
+"""
+
+# A protocol in German or Spanish contains its texts, and its hash covers them: a change of a shipped translation would
+# change these hashes.
 SCREENS: dict[str, str] = {
-    # Footer: what a key does. Short, because all keys of a screen stand in one line of 80 columns.
+    # Footer: what a key does. Short, because a single line of 80 columns shows all keys of a screen.
     "key_help": "Help",
     "key_begin": "Begin",
     "key_answer_1": "Answer 1",
@@ -39,7 +43,7 @@ SCREENS: dict[str, str] = {
     "keys_named": "{first} for 1, {second} for 2",
     "enter_key": "Enter",
     "space_key": "The space bar",
-    # Where one is.
+    # Position in the session and what remains.
     "run_practice": "Practice",
     "run_interval": "Interval run",
     "run_training": "Training",
@@ -120,7 +124,7 @@ SCREENS: dict[str, str] = {
     "demo_and": "{first} and {second}",
     "demo_none": "Nothing of it was felt yet.",
     "simulation": "The device is a simulation: nothing moves.",
-    # While something plays; the handle's place.
+    # While a stimulus plays; the position of the handle.
     "playing_no_key": "It ends by itself. No key is needed.",
     "playing_only_feel": "Only feel. No key is needed yet.",
     "playing_gap": "A moment.",
@@ -206,7 +210,7 @@ SCREENS: dict[str, str] = {
     "check_look": "Something needs a look. Press c to check again, or g to go on all the same.",
     "check_ready": "The device is ready.",
     "check_ready_warning": "The device is ready; mind the warning above.",
-    # Line mode, beside the above.
+    # Line mode, in addition to the texts above.
     "line_keys": "Keys: {keys} answers, r plays it again, p pauses, q leaves, ? shows this. Each followed by Enter. "
     "Ctrl-C stops the device at once.",
     "line_hold": "Hold the handle with a constant, comfortable grip. In each trial it shakes along one of two "

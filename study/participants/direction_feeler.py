@@ -1,11 +1,12 @@
-"""Simulated participant with a direction threshold: signal detection theory over a Weibull curve.
+"""Simulated participant with a direction threshold: signal detection theory with a Weibull psychometric function.
 
-One presentation, two possible answers (identification, not a choice between intervals). The evidence is normal around
-+d'/2 for direction 1 and -d'/2 for direction 2 with unit standard deviation; answer 1 is given above the criterion.
-Without bias the fraction of right answers is Phi(d'/2), so d' = 2 Phi^-1(fraction of the Weibull curve); a criterion
-lowers the fraction at equal d'.
+A trial is one presentation with two possible answers (identification, not a choice between intervals). The evidence is
+normal around +d'/2 for direction 1 and -d'/2 for direction 2 with unit standard deviation; answer 1 is given above the
+criterion. Without bias the fraction of right answers is Phi(d'/2), so d' = 2 Phi^-1(fraction of the Weibull curve).
+With a criterion c it is Phi(d'/2 - c) for direction 1 and Phi(d'/2 + c) for direction 2, which is less on average.
 
-In a detection trial the alternatives are two intervals: the same model with the detection curve, at much lower levels.
+In a detection trial the alternatives are two intervals; the same model is used with the detection curve, whose levels
+are much lower.
 
 Source: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed. (2005), chapters 1 and 2.
 """
@@ -26,28 +27,31 @@ _NORMAL = NormalDist()
 
 @dataclass(frozen=True, slots=True)
 class DirectionFeeler:
-    """An `Observer` with thresholds for the direction over frequency."""
+    """An `Observer` with direction and detection thresholds that depend on frequency."""
 
     name: str
     thresholds_n: tuple[tuple[float, float], ...]
-    """(frequency in Hz, level in N with 79.37 % of the directions right), frequencies ascending."""
+    """(frequency in Hz, level in N at which 79.37 % of the directions are right), frequencies ascending."""
     slope: float = 2.0
-    """Slope of the Weibull function over newtons; people's are between 1 and 3.5."""
+    """Slope (exponent) of the Weibull function of force, without unit; typical values for people are 1 to 3.5."""
     lapse: float = 0.0
-    """Fraction of wrong answers at the strongest level; lapses are random answers, at twice this rate."""
+    """Lapse rate: fraction of wrong answers at the strongest level. Random answers occur at twice this rate, half of
+    them right."""
     criterion: float = 0.0
-    """c of Macmillan and Creelman, as in `psychophysics.bias`: positive, a tendency to answer 2; negative, to 1."""
+    """c of Macmillan and Creelman, in standard deviations of the evidence, as in `psychophysics.bias`: positive for a
+    tendency to answer 2, negative for 1."""
     drift_db_per_100_trials: float = 0.0
-    """Rise of the thresholds during the session."""
+    """Rise of the thresholds during the session (dB per 100 trials)."""
     criterion_per_100_trials: float = 0.0
-    """Drift of the criterion during the session."""
+    """Drift of the criterion during the session (per 100 trials)."""
     numb_above_hz: float = math.inf
-    """Above this frequency the direction is not felt; the vibration is."""
+    """Frequency (Hz) above which the direction is not felt, although the vibration is."""
     detection_n: tuple[tuple[float, float], ...] = TYPICAL_DETECTION_N
-    """(frequency in Hz, level in N at which the vibration's interval is found 79.37 % of the time)."""
+    """(frequency in Hz, level in N at which the interval of the vibration is found in 79.37 % of the trials),
+    frequencies ascending."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """The answer to one presentation."""
+        """Answer (1 or 2) and response time (s) for one presentation, random but the same for equal arguments."""
         luck, delay = uniform(felt, seed, 2)
         answer = 1 if luck < self.share_of_1(felt) else 2
         return Reply(answer, response_time_s(delay))
@@ -64,11 +68,11 @@ class DirectionFeeler:
         return share_of_1 if felt.direction_shown == 1 else 1.0 - share_of_1
 
     def criterion_at(self, felt: PerceivedStimulus) -> float:
-        """c at this trial."""
+        """Criterion c at this trial, with its drift."""
         return self.criterion + self.criterion_per_100_trials * felt.trials_before / 100.0
 
     def d_prime(self, felt: PerceivedStimulus) -> float:
-        """Sensitivity to this stimulus."""
+        """Sensitivity d' to this stimulus: 0 for the direction above `numb_above_hz`."""
         detection = felt.phase is Phase.DETECTION
         if felt.frequency_hz > self.numb_above_hz and not detection:
             return 0.0

@@ -1,8 +1,9 @@
 """A population of simulated participants with individual thresholds that rise with frequency.
 
-All numbers are assumptions of the authors, chosen such that a study of ten resembles the published figure 2: lowest
-threshold at 5 Hz, a significant rise at 35 Hz, some participants at the cap there, 45 Hz similar to 35 Hz. No published
-threshold is copied.
+In dB, the threshold of a participant at a frequency is the median of the population plus a normal deviation of the
+person plus a normal deviation of person and frequency. All numbers are assumptions of the authors, chosen such that a
+study of ten resembles the published figure 2: lowest threshold at 5 Hz, a significant rise at 35 Hz, some participants
+at the cap there, 45 Hz similar to 35 Hz. No published threshold is copied.
 """
 
 from dataclasses import replace
@@ -15,32 +16,34 @@ from study.participants.direction_feeler import DirectionFeeler
 from study.participants.unsure import UnsureRepeater
 
 TYPICAL_THRESHOLDS_N = ((5.0, 0.35), (15.0, 0.6), (25.0, 0.85), (35.0, 2.2), (45.0, 2.2))
-"""(Hz, N): the median participant. A quarter of the participants is above the cap of 3 N at 35 Hz."""
+"""(Hz, N): thresholds of the median participant. With the spreads below, 19 % of the participants have a threshold
+above 3 N at 35 Hz."""
 
 SPREAD_OF_PERSON_DB = 2.5
-"""Standard deviation between participants, common to all frequencies."""
+"""Standard deviation of the person's deviation, common to all frequencies of a participant."""
 SPREAD_OF_FREQUENCY_DB = 1.7
-"""Standard deviation per frequency. Together 3 dB between participants."""
+"""Standard deviation of the deviation at a single frequency; both together: 3 dB between participants."""
 SPREAD_OF_DETECTION_DB = 2.5
 """Standard deviation of detection thresholds between participants, at all frequencies; independent of the direction
 thresholds."""
 
 
 def population(n: int, seed: int) -> tuple[DirectionFeeler, ...]:
-    """n participants; the first ones do not change when n grows."""
+    """Participants 1 to n of the population of this seed. Each depends on its number and the seed only, not on n."""
     return tuple(person(number, seed) for number in range(1, n + 1))
 
 
 KINDS = ("person", "delivered", "repeating", "criterion_drift")
-"""What a population can be made of: as they are; feeling what was delivered; asking again when unsure; with a criterion
-that drifts."""
+"""Kinds of participants: `DirectionFeeler` unchanged; one who perceives the delivered acceleration
+(`DeliveredFeeler`); one who asks for a repetition when unsure (`UnsureRepeater`); with a criterion that drifts."""
 CRITERION_DRIFT_SD = 0.3
-"""Per 100 trials, between participants: a session of 350 trials moves a criterion by about 1."""
+"""Standard deviation between participants of the drift per 100 trials, in units of the criterion (standard deviations
+of the evidence): in a session of 350 trials the criterion moves by about 1."""
 
 
 def member(kind: str, number: int, seed: int) -> DirectionFeeler | DeliveredFeeler | UnsureRepeater:
-    """Participant `number` (from 1) of the population of this seed, made `kind` of `KINDS`, with the same thresholds.
-    The name contains all three."""
+    """Participant `number` (from 1) of the population of this seed, as a `kind` of `KINDS`; the thresholds are the same
+    for all kinds. The name contains number and seed. Raises ValueError for another kind."""
     one, name = person(number, seed), f"{kind}_{number}_seed_{seed}"
     match kind:
         case "person":
@@ -56,8 +59,8 @@ def member(kind: str, number: int, seed: int) -> DirectionFeeler | DeliveredFeel
 
 
 def person(number: int, seed: int) -> DirectionFeeler:
-    """Participant `number` (from 1) of the population of this seed; the name contains both, so that a log can
-    recreate it."""
+    """Participant `number` (from 1) of the population of this seed. The name contains both numbers, so that the
+    participant can be recreated from a log."""
     rng = np.random.default_rng([seed, number])
     person_db = rng.normal(0.0, SPREAD_OF_PERSON_DB)
     offsets_db = person_db + rng.normal(0.0, SPREAD_OF_FREQUENCY_DB, len(TYPICAL_THRESHOLDS_N))
@@ -67,6 +70,7 @@ def person(number: int, seed: int) -> DirectionFeeler:
             (frequency_hz, float(threshold_n * 10.0 ** (offset_db / 20.0)))
             for (frequency_hz, threshold_n), offset_db in zip(TYPICAL_THRESHOLDS_N, offsets_db, strict=True)
         ),
+        # Slope: log-normal, median 2. Lapse rate: Beta(1, 60), mean 1/61. Drift: half-normal, dB per 100 trials.
         slope=float(np.exp(rng.normal(np.log(2.0), 0.25))),
         lapse=float(rng.beta(1.0, 60.0)),
         criterion=-float(rng.normal(0.0, 0.15)),
@@ -79,5 +83,5 @@ def person(number: int, seed: int) -> DirectionFeeler:
 def _shift_thresholds(
     thresholds_n: tuple[tuple[float, float], ...], offset_db: float
 ) -> tuple[tuple[float, float], ...]:
-    """Thresholds (Hz, N) changed by an offset in dB."""
+    """Thresholds (Hz, N), all multiplied by 10^(offset_db / 20)."""
     return tuple((frequency_hz, float(n * 10.0 ** (offset_db / 20.0))) for frequency_hz, n in thresholds_n)

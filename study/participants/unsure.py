@@ -1,9 +1,9 @@
-"""Simulated participant who asks for the same trial again when unsure, and decides on all looks together.
+"""Simulated participant who asks for a repetition of a trial when unsure, and decides on all its presentations.
 
-Every look gives evidence for direction 1 or 2, normal around +d'/2 or -d'/2 with unit standard deviation; looks are
-independent and are averaged, so two of them tell as much as d' sqrt(2). The participant asks again where the average
-lies within `unsure` standard errors of the criterion. Its looks follow from the number of the attempt, so that the
-participant stays stateless.
+Signal detection theory with multiple looks: each presentation (look) gives evidence, normal around +d'/2 for direction
+1 and -d'/2 for direction 2 with unit standard deviation. Looks are independent and averaged, so that n of them have the
+sensitivity d' sqrt(n). The participant asks again where the average lies within `unsure` standard errors of the
+criterion. The evidence of earlier looks is drawn again from the numbers of their attempts, so that no state is kept.
 """
 
 import math
@@ -24,14 +24,16 @@ class UnsureRepeater:
 
     name: str
     feeler: DirectionFeeler
+    """Thresholds, criterion and lapse rate of the participant."""
     unsure: float = 0.5
-    """Threshold of doubt in standard errors of the averaged evidence: 0.5 asks again in about 30 % of the trials near
-    the threshold."""
+    """Largest distance of the averaged evidence from the criterion, in standard errors, at which the participant asks
+    again: 0.5 does so after about 30 % of the first looks near the threshold."""
     looks: int = 5
-    """Most presentations of one trial; then it is answered in any case."""
+    """Largest number of presentations of one trial; after the last, the answer is final."""
 
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
-        """The answer on all looks so far, and whether another is asked for."""
+        """The answer from all looks so far, and whether the participant asks for another. A lapse is a random answer
+        without asking again; its probability is twice `lapse`, because half of such answers are right."""
         delay, lapsed, coin = uniform(felt, seed, 4)[1:]
         evidence = self._evidence(felt, seed)
         answer = 1 if evidence > 0.0 else 2
@@ -41,7 +43,7 @@ class UnsureRepeater:
         return Reply(answer, response_time_s(delay), ask_again)
 
     def _evidence(self, felt: PerceivedStimulus, seed: int) -> float:
-        """Average of all looks minus the criterion, in standard errors."""
+        """Average evidence of all looks minus the criterion, in standard errors of the average."""
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         middle = sign * self.feeler.d_prime(felt) / 2.0 - self.feeler.criterion_at(felt)
         luck = [uniform(replace(felt, attempt=look), seed, 1)[0] for look in range(felt.attempt + 1)]

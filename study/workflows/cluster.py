@@ -1,6 +1,7 @@
-"""Work on the workers of a dask scheduler: the same executor interface as for the processes of this computer.
+"""Execution of work on the workers of a dask cluster, by the `Executor` interface that local processes also have.
 
-Each worker imports hapteq itself, so that all must have the same version: other code could give other numbers.
+Each worker imports its own installation of hapteq. All must have the same version, because other code could give other
+numbers.
 """
 
 import threading
@@ -21,23 +22,24 @@ if TYPE_CHECKING:
 SCHEDULER_TIMEOUT_S = 10.0
 """Timeout in seconds for the scheduler to answer."""
 WORKER_TIMEOUT_S = 60.0
-"""Longest time in seconds that work waits without any worker, or for a scheduler that names none: either may be
-starting anew."""
+"""Longest time in seconds that work waits while the scheduler has no worker or does not answer; either may be
+restarting."""
 POLL_S = 1.0
 """Interval in seconds at which the workers are counted."""
 KEPT = "What was finished is kept."
-"""What was saved, in errors of a cluster."""
+"""Sentence on what was saved, for errors after the work began."""
 INSTALL = "pip install 'hapteq[cluster]'"
+"""Command that installs dask with its scheduler."""
 
 
 @contextmanager
 def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Executor]:
-    """address: of the scheduler, such as tcp://10.0.0.5:8786. A piece of work whose worker dies is done by another.
-    one_thread: refuse workers that do several pieces at once, for work that draws figures or measures processor time.
+    """Executor on the workers of the scheduler at `address`, such as tcp://10.0.0.5:8786. A task whose worker dies is
+    repeated by another. one_thread: refuse workers with several threads, for tasks that draw or measure processor time.
 
-    Raises StudyError where no scheduler answers, it has no workers, a worker has another version, or, later, where
-    the scheduler is lost, workers die at the same piece again and again, or for `WORKER_TIMEOUT_S` none is left or
-    the scheduler does not answer.
+    Raises StudyError where no scheduler answers, it has no workers, or a worker has another version; later, where the
+    scheduler is lost, a task repeatedly kills its workers, or for `WORKER_TIMEOUT_S` there is no worker or the
+    scheduler does not answer.
     """
     try:
         import dask
@@ -70,8 +72,8 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
         except (KilledWorker, ClosedClientError, CommClosedError, CancelledError) as problem:
             raise causes[0] if causes else _undone_error(problem) from problem
         except (RuntimeError, TypeError, ValueError) as problem:
-            # A future that is lost with its scheduler has no result, and distributed's executor fails on unpacking it;
-            # one that was given up for want of workers takes no more work.
+            # A future that was lost with its scheduler has no result, on which distributed's executor fails; an
+            # executor that `_watch` cancelled refuses further tasks. Both are errors of the cluster, not of a task.
             if client.status == "running" and not causes:
                 raise
             raise causes[0] if causes else _undone_error(problem) from problem
@@ -89,16 +91,17 @@ def _executor(client: "Client") -> Iterator[Executor]:
 
 
 def _cancel(executor: Executor) -> None:
-    """Cancel all its work, which the scheduler need not answer."""
+    """Cancel all tasks of the executor, without waiting for an answer of the scheduler."""
     from distributed.client import ClosedClientError
 
-    with suppress(ClosedClientError):  # a client that gave its scheduler up: there is no work any more
+    with suppress(ClosedClientError):  # the client has lost its scheduler, and with it all tasks
         executor.shutdown(wait=False)
 
 
 @contextmanager
 def _watch(client: "Client", executor: Executor, address: str, causes: list[StudyError]) -> Iterator[None]:
-    """Cancel all work, and append why to `causes`, where no worker was seen for `WORKER_TIMEOUT_S`."""
+    """While the context lasts: cancel all tasks, and append the cause to `causes`, if for `WORKER_TIMEOUT_S` the
+    scheduler has no worker or does not answer."""
     left = threading.Event()
     watcher = threading.Thread(target=partial(_await_loss, client, executor, address, causes, left), daemon=True)
     watcher.start()
@@ -106,12 +109,13 @@ def _watch(client: "Client", executor: Executor, address: str, causes: list[Stud
         yield
     finally:
         left.set()
-        watcher.join(POLL_S)  # it may still wait for a scheduler that does not answer, and does nothing after that
+        watcher.join(POLL_S)  # if the scheduler does not answer, the thread still waits for it, and does nothing more
 
 
 def _await_loss(
     client: "Client", executor: Executor, address: str, causes: list[StudyError], left: threading.Event
 ) -> None:
+    """Count the workers every `POLL_S` until `left` is set or they are lost; runs in the thread of `_watch`."""
     last_seen_s = time.monotonic()
     while not left.wait(POLL_S):
         workers, problem = _workers(client)
@@ -124,7 +128,7 @@ def _await_loss(
 
 
 def _workers(client: "Client") -> tuple[int, Exception | None]:
-    """How many the scheduler names; none, and why, where it does not answer in `SCHEDULER_TIMEOUT_S`."""
+    """Number of the scheduler's workers; 0 and the error where it does not answer within `SCHEDULER_TIMEOUT_S`."""
     try:
         return len(client.nthreads(callback_timeout=SCHEDULER_TIMEOUT_S)), None
     except Exception as problem:  # noqa: BLE001 — distributed has many for a lost scheduler, and none may end the watch
@@ -161,7 +165,7 @@ def _undone_error(problem: BaseException) -> StudyError:
 
 
 def own_version() -> str:
-    """Version of hapteq, here and on each worker; empty where it is not installed."""
+    """Version of hapteq in the process that calls it, this one or a worker; empty where hapteq is not installed."""
     try:
         return version("hapteq")
     except PackageNotFoundError:
@@ -170,24 +174,27 @@ def own_version() -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """The workers of a scheduler."""
+    """Versions and threads of the workers of a scheduler."""
 
     versions: dict[str, str]
-    """Of hapteq, by address; empty where it is not installed."""
+    """Version of hapteq by the worker's address; empty where hapteq is not installed."""
     threads: tuple[int, ...]
+    """Number of threads of each worker."""
 
 
 def _ask(client: "Client") -> _Found:
+    """Ask the workers for their version of hapteq, and the scheduler for their threads."""
     try:
         versions: dict[str, str] = client.run(own_version)
-    except ImportError:  # what a worker without hapteq says of the function that it is sent
+    except ImportError:  # raised by a worker without hapteq, which cannot import `own_version`
         versions = dict.fromkeys(client.scheduler_info()["workers"], "")
     workers = client.scheduler_info(n_workers=-1)["workers"].values()
     return _Found(versions, tuple(worker["nthreads"] for worker in workers))
 
 
 def _ask_in_time(client: "Client", address: str) -> _Found:
-    """distributed waits without a limit for a scheduler that stands still, and for a worker that does."""
+    """`_ask` with a time limit, `WORKER_TIMEOUT_S`: distributed waits without a limit for a scheduler or a worker that
+    does not answer. Raises StudyError."""
     asked = Future[_Found]()
 
     def ask() -> None:
@@ -200,7 +207,7 @@ def _ask_in_time(client: "Client", address: str) -> _Found:
     try:
         return asked.result(timeout=WORKER_TIMEOUT_S)
     except TimeoutError as problem:
-        if asked.done():  # an error of the question itself, which came before the time was up
+        if asked.done():  # the TimeoutError was raised by `_ask` itself, before the time limit
             raise _cluster_error(
                 f"The scheduler at {address} was reached, and asking its workers failed: "
                 f"{str(problem) or type(problem).__name__}.",
@@ -215,9 +222,10 @@ def _ask_in_time(client: "Client", address: str) -> _Found:
 
 
 def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
+    """Raise StudyError unless there are workers, with this version of hapteq, and with one thread each if needed."""
     asked = _ask_in_time(client, address)
     found = asked.versions
-    if not found or not asked.threads:  # they may have left between the two questions
+    if not found or not asked.threads:  # workers may have left between the two requests
         raise _cluster_error(f"The scheduler at {address} has no workers.", f"Start some: dask worker {address}.")
     own = own_version()
     if wrong := sorted({each or "none" for each in found.values() if each != own}):

@@ -1,10 +1,10 @@
-"""`map` over forked processes: for work in Python code, where threads would wait for the interpreter lock.
+"""`map` over forked processes, for work in Python code, where threads would wait for the global interpreter lock.
 
-A forked process inherits all data; results come back through a pipe. Workers and the calling process take pieces one
-after another until none is left. Nested calls run serially.
+A forked process inherits all data; results return through a pipe. The workers and the calling process take pieces of
+work one after another from a shared pipe of tokens until it is empty (dynamic scheduling). Nested calls run serially.
 
-Forking is safe beside numba here: no kernel has `parallel=True` or `prange`, so numba starts no threads whose locks a
-forked process would inherit.
+Forking is safe together with numba here: no kernel has `parallel=True` or `prange`, so numba starts no threads whose
+locks a forked process would inherit.
 """
 
 import io
@@ -25,23 +25,23 @@ from equalizer.effects.effect import Effect, effects_by_address
 
 Result = TypeVar("Result")
 WORTH_S = 0.1
-"""Work that took less than this (s) the last time is done without forking: forking alone costs a fifth of it."""
+"""Work that is expected to take less than this (s) is done without forking, which alone costs a fifth of this time."""
 _TOKEN, _MOST_TOKENS = 4, 8192
-"""Bytes of a token in the pipe from which pieces are taken; number of tokens that fit into it."""
+"""Bytes of a token, the number of the first of some pieces; largest number of tokens that the pipe holds."""
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""Signals that may raise an exception anywhere in our programs."""
+"""Signals whose handlers may raise an exception at any point of the program."""
 _mean_s: dict[CodeType | type, float] = {}
-"""Mean duration of a piece (s) the last time a function was mapped."""
+"""Mean duration of a piece (s) the last time each function was mapped."""
 _lost: set[CodeType | type] = set()
-"""Functions whose results could not be sent, or whose process died: they are not forked again."""
+"""Functions whose results could not be pickled, or whose process died: they are not forked again."""
 _spent_s = [0.0]
-"""Processor time of the processes from which this one was forked, until then."""
+"""Processor time (s) that the parent processes had used when this process was forked."""
 _within: list[bool] = []
-"""Not empty within a piece of work: no further processes are started there."""
+"""Not empty within a piece of work, where no further processes are started."""
 
 
 def processor_s() -> float:
-    """Processor time of this work (s), in this process and all ended children."""
+    """Processor time of this work (s): of this process, its ended children, and its parents before the fork."""
     ended = os.times()
     return _spent_s[0] + process_time() + ended.children_user + ended.children_system
 
@@ -54,11 +54,12 @@ def cores() -> int:
 
 
 def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: int | None = None) -> list[Result]:
-    """Parallel `map` in forked processes, in the same order. Exceptions are raised here; no process is left behind."""
+    """Parallel `map` in forked processes, with results in the order of the items. workers: number of processes with
+    this one; None = `cores()`. An exception of `function` is raised here; no process is left running."""
     pieces = list(zip(*items, strict=True))
     count = min(len(pieces), workers or cores())
     key = _key(function)
-    # macOS does not allow what its libraries start to be forked.
+    # On macOS system libraries start threads, after which forking is not safe.
     possible = count > 1 and not _within and sys.platform != "darwin" and hasattr(os, "fork")
     if possible and key not in _lost and _mean_s.get(key, WORTH_S) * len(pieces) >= WORTH_S:
         return _Shared(function, pieces).with_others(count - 1)
@@ -71,8 +72,8 @@ def map_forked(function: Callable[..., Result], *items: Iterable[Any], workers: 
 
 @contextmanager
 def without_forking() -> Iterator[None]:
-    """Within this context nothing is forked, for workers whose neighbours use the other cores. The results are the
-    same."""
+    """Context in which nothing is forked, for workers that already share the processors with others. Results do not
+    change."""
     _within.append(True)
     try:
         yield
@@ -81,7 +82,7 @@ def without_forking() -> Iterator[None]:
 
 
 class _Shared:
-    """Pieces of work that several processes take one after another."""
+    """Pieces of work that several processes take one after another, by tokens in a pipe."""
 
     def __init__(self, function: Callable[..., Any], pieces: Sequence[tuple[Any, ...]]) -> None:
         self._function, self._pieces = function, pieces
@@ -93,6 +94,7 @@ class _Shared:
         os.close(end)
 
     def with_others(self, others: int) -> list[Any]:
+        """All results, in order, computed with so many further processes. On any exception the processes are killed."""
         children: list[tuple[int, int]] = []
         try:
             while len(children) < others and self._fork_worker(children):
@@ -113,6 +115,7 @@ class _Shared:
         return self._in_order(found)
 
     def _in_order(self, found: dict[int, tuple[Any, Exception | None]]) -> list[Any]:
+        """The results in the order of the pieces. Raises the error of the first piece that failed."""
         results = []
         for number, piece in enumerate(self._pieces):
             if number not in found:
@@ -128,13 +131,14 @@ class _Shared:
     def _fork_worker(self, children: list[tuple[int, int]]) -> bool:
         """Start a process and append it with its pipe to `children`; False if the system refuses."""
         spent_s, parent = processor_s(), os.getpid()
-        # An exception in between would leave a process that is in no list, or let it go on with its parent's work.
+        # Signals wait: an exception here would leave a process that is not in `children`, or would let the child return
+        # from this function and continue the work of its parent.
         with _hold_signals():
             answers, end = os.pipe()
             try:
                 with warnings.catch_warnings():
-                    # Python warns of other threads, whose locks the child might wait for: the child only computes, and
-                    # leaves without cleaning up.
+                    # Python warns of other threads, for whose locks the child might wait. The child only computes and
+                    # exits without clean-up, so that it takes no such lock.
                     warnings.simplefilter("ignore", DeprecationWarning)
                     process = os.fork()
             except OSError:
@@ -143,7 +147,7 @@ class _Shared:
                 return False
             if not process:
                 try:
-                    # Otherwise its own results would wait for ever to be read, once its parent is gone.
+                    # With a reading end open here, writing results would block for ever after the parent has ended.
                     for other in (answers, *(theirs for _, theirs in children)):
                         os.close(other)
                     self._work_there(end, parent, spent_s)
@@ -154,7 +158,8 @@ class _Shared:
         return True
 
     def _work_there(self, end: int, parent: int, spent_s: float) -> None:
-        # A terminal sends Ctrl-C to all; the process that forked this one ends it.
+        """In the child: take pieces and write their results to the pipe `end`. parent: its process identifier."""
+        # A terminal sends Ctrl-C to all processes; the child ignores it, and its parent ends it.
         for number in _SIGNALS:
             signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
@@ -165,7 +170,8 @@ class _Shared:
             pipe.write(sent)
 
     def _take_pieces(self, guarded: bool, parent: int = 0) -> dict[int, tuple[Any, Exception | None]]:
-        """Results and errors, by number. guarded: an error is kept and ends this process's share."""
+        """Results and errors by the number of the piece, until no token is left. guarded (in a child): an error is kept
+        as a result and ends the work of this process, and so does the end of the parent; else it is raised."""
         found: dict[int, tuple[Any, Exception | None]] = {}
         begun_s = perf_counter()
         while token := os.read(self._tokens, _TOKEN):
@@ -187,7 +193,7 @@ class _Shared:
 
 @contextmanager
 def _hold_signals() -> Iterator[None]:
-    """Block the signals until the context is left."""
+    """Context in which `_SIGNALS` are blocked; they are delivered after it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     try:
         yield
@@ -196,13 +202,14 @@ def _hold_signals() -> Iterator[None]:
 
 
 def _reap(process: int, answers: int) -> None:
+    """Close the pipe of a child and wait for its end, so that it does not remain as a zombie."""
     os.close(answers)
     with suppress(ChildProcessError):
         os.waitpid(process, 0)
 
 
 def _key(function: Callable[..., Any]) -> CodeType | type:
-    """Identifies a function, also one that is created anew for each map."""
+    """Identifier of a function that is the same for closures and partial functions created anew for each map."""
     inner = unwrap(function)
     while isinstance(inner, partial):
         inner = unwrap(inner.func)
@@ -210,7 +217,8 @@ def _key(function: Callable[..., Any]) -> CodeType | type:
 
 
 class _Pickler(pickle.Pickler):
-    """Effects are sent by their address, which is the same in a forked process."""
+    """Pickler that sends effects by their address, which is the same in a forked process. Raises PicklingError for an
+    effect that was not known before the fork."""
 
     def __init__(self, file: io.BytesIO, known: Mapping[int, Effect]) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
@@ -225,6 +233,8 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
+    """Unpickler that finds effects by their address."""
+
     def __init__(self, file: io.BytesIO, known: Mapping[int, Effect]) -> None:
         super().__init__(file)
         self._known = known
@@ -234,7 +244,7 @@ class _Unpickler(pickle.Unpickler):
 
 
 def _pack(found: dict[int, tuple[Any, Exception | None]], known: Mapping[int, Effect]) -> bytes:
-    """Pickle the results one by one; those that cannot be pickled are left out."""
+    """The results pickled separately; those that cannot be pickled are left out, and the parent computes them."""
     whole = io.BytesIO()
     for number, answer in found.items():
         each = io.BytesIO()
@@ -247,6 +257,7 @@ def _pack(found: dict[int, tuple[Any, Exception | None]], known: Mapping[int, Ef
 
 
 def _receive(answers: int, known: Mapping[int, Effect]) -> dict[int, tuple[Any, Exception | None]]:
+    """Results of a child, by the number of the piece, up to the first that is incomplete."""
     with os.fdopen(answers, "rb", closefd=False) as pipe:
         sent = io.BytesIO(pipe.read())
     found: dict[int, tuple[Any, Exception | None]] = {}

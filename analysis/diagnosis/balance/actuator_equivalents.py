@@ -1,13 +1,13 @@
-"""Laws of a driven motion that cannot be distinguished from laws of its actuator.
+"""Withdraws the name of a law of motion where a law of the actuator explains the data equally well.
 
-In the balance m a + d v + F_c sgn v + c v |v| = g(u) of a motion v that a command u drives:
+With the velocity v, acceleration a and command u of an axis, the force balance is
+m a + d v + F_c sgn v + c v |v| = g(u). It does not identify its laws uniquely in three cases:
 
-- Without reversal, F_c sgn v is a constant while it moves, and holds it at rest below u = F_c: so does a dead band
-  g(u) = u - F_c, and the drag c v |v| beside it may be the curve of that actuator.
-- Where m a is negligible, v is a function of u: drag that grows with v equals a gain that falls with u, and a dead band
-  dry friction.
-- Where the axis rests as long as its dead band passes no force, dry friction may hold it instead: the two are named as
-  a class.
+- v never changes its sign: dry friction F_c sgn v is then a constant and holds the axis at rest below u = F_c, as the
+  dead band g(u) = u - F_c does; a quadratic drag c v |v| found together with it may be a nonlinearity of g.
+- m a is negligible: v is then a function of u alone, so that drag that grows with v is equivalent to a gain that falls
+  with u, and a dead band is equivalent to dry friction.
+- The axis rests while its dead band passes no force: dry friction may hold it instead; both are named, as a class.
 """
 
 from dataclasses import replace
@@ -22,13 +22,14 @@ from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
 
 DEAD_BAND = "force_deadband"
 EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND: "coulomb_friction"}
-"""Where inertia is negligible."""
+"""For each law, the law that explains the same motion where inertia is negligible."""
 BACKWARDS = "it never moves backwards"
+"""Reason, in a message, for a law that is not named."""
 
 
 def doubt_laws_of_actuator(balance: Balance) -> Balance:
-    """The balance of a driven axis, with the names removed from laws that may as well be its actuator's. Without a law
-    of the command, laws found behind it are not named either."""
+    """The balance of a driven axis without the names of laws that its actuator explains equally well. Where this leaves
+    no law of the command with a name, the other laws lose theirs too: they were fitted to the force behind that law."""
     laws = tuple(_doubt_law(each, balance) for each in balance.laws)
     through = [each.law.effect for each in balance.named if not each.has_column]
     if through and not any(each.named and not each.has_column for each in laws):
@@ -38,6 +39,7 @@ def doubt_laws_of_actuator(balance: Balance) -> Balance:
 
 
 def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
+    """The law, with its name withdrawn or with its equivalent added, by the three cases of the module's docstring."""
     regression, effect = balance.search.regression, judged.law.effect
     if judged.named and effect == DEAD_BAND and not judged.has_column and _rests_within(regression):
         return replace(judged, alike=tuple(dict.fromkeys((*judged.alike, EQUIVALENT_LAWS[DEAD_BAND]))))
@@ -57,8 +59,8 @@ def _doubt_law(judged: JudgedLaw, balance: Balance) -> JudgedLaw:
 
 
 def _rests_within(regression: Regression) -> bool:
-    """Whether the axis rests in most samples in which its dead band passes no force: the regression's forces are those
-    behind the dead band."""
+    """Whether the axis rests in most samples in which its dead band passes no force. The forces of the regression are
+    those behind the dead band, so that such samples have a force of exactly 0."""
     motions, axis, own = regression.motions, regression.axis, regression.beside.own
     speed = np.concatenate([motion.velocity[motion.fit, own] for motion in motions])
     force = np.concatenate([motion.force[motion.fit, axis] for motion in motions])
@@ -67,21 +69,22 @@ def _rests_within(regression: Regression) -> bool:
 
 
 def _mark_alike(judged: JudgedLaw, twin: str, why: str) -> JudgedLaw:
-    """The law without its name, and with the law that it may be mistaken for."""
+    """The law with a reason not to name it, and with its equivalent (`twin`) added to its class."""
     alike = tuple(dict.fromkeys((twin, *judged.alike)))
     return replace(judged, alike=alike, why_not=f"these data cannot tell it from {twin}, for {why}")
 
 
 def _reverses(regression: Regression, channel: int) -> bool:
-    """Whether the squared speed of either direction is more than the share of standstill of the other's."""
+    """Whether the motion changes direction: the sum of squared velocities of the weaker direction exceeds
+    `STILL_SHARE` of that of the stronger."""
     velocity = np.concatenate([motion.velocity[motion.fit, channel] for motion in regression.motions])
     power = [float(np.sum(np.maximum(sign * velocity, 0.0) ** 2)) for sign in (1.0, -1.0)]
     return min(power) > STILL_SHARE * max(power)
 
 
 def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
-    """Whether a mass reduces the cross-validated error notably, and delays the speed by more than a sample. True where
-    the mass is given, or where it cannot show, without a time axis."""
+    """Whether a mass reduces the cross-validated error significantly (`is_better`) and its time constant m / d exceeds
+    a sample. True without a test where the mass is given, or where the data have no time axis to determine it from."""
     columns, own = regression.columns_of(laws), regression.beside.own
     if regression.mass is not None or not np.isfinite(regression.motions[0].band_hz):
         return True

@@ -1,4 +1,10 @@
-"""Normal equations of blocks of samples: the Gram matrices and cross products from which least squares is solved."""
+"""Normal equations of linear least squares, X'X w = X'y, block by block of consecutive samples.
+
+X (samples, k) holds the columns of a force balance, such as acceleration, velocity and position; y is the force. A
+block keeps the Gram matrix X'X and the cross products X'y only. Sums of these over blocks give the fit to any subset of
+blocks and columns without the samples, which makes cross-validation fast. The residual sum of squares of weights w is
+y'y - 2 w'X'y + w'X'X w.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,16 +17,17 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 RIDGE = 1e-10
-"""Ridge relative to the mean power of a column, for columns that are equal, or rounding errors, in some blocks."""
+"""Ridge, relative to the mean diagonal element of X'X. It keeps the equations solvable where two columns of a block are
+equal, or a column holds rounding errors alone."""
 
 
 Prior = tuple[FloatArray, FloatArray] | None
-"""Gaussian prior of the first k weights: precision (k,), and precision times mean (k,); added to the products."""
+"""Gaussian prior of the first k weights: precision (k,), and precision times mean (k,). None = no prior."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Block:
-    """A block of consecutive samples as products: of the columns with each other and with the force."""
+    """Products of a block of consecutive samples: of its columns with each other and with the force."""
 
     gram: FloatArray
     """(k, k): X'X of the columns X."""
@@ -31,8 +38,9 @@ class Block:
     signal: float
     """Sum of squares of the force about its mean over all fitted samples."""
     motion: int
+    """Index of the motion to which the block belongs."""
     rows: npt.NDArray[np.intp]
-    """Indices of its samples among the motion's kept ones."""
+    """Indices of the block's samples among the kept samples of its motion."""
 
 
 def column_scale(rows: Sequence[FloatArray], fit: Sequence[Mask]) -> FloatArray:
@@ -82,8 +90,8 @@ def sum_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[Float
 
 
 def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
-    """Weights (..., c) of stacked systems with Gram matrices (..., c, c) and cross products (..., c). ridge: over the
-    mean diagonal element."""
+    """Weights (..., c) of stacked systems with Gram matrices (..., c, c) and cross products (..., c). ridge: added to
+    the diagonal, relative to its mean. Raises LinAlgError where a system is singular nevertheless."""
     gram, cross = products
     count = gram.shape[-1]
     size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / count
@@ -91,7 +99,7 @@ def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float
 
 
 def solve_without_columns(gram: FloatArray, cross: FloatArray, fixed: Mask) -> FloatArray:
-    """Solve the normal equations as `solve_normal_equations` does, with the weights of `fixed` columns held at zero."""
+    """Weights (..., c), with those of the `fixed` (c,) columns held at zero; see `solve_normal_equations`."""
     free = np.flatnonzero(~fixed)
     found = np.zeros_like(cross)
     found[..., free] = solve_normal_equations((gram[..., free[:, None], free], cross[..., free]), RIDGE)
@@ -99,14 +107,16 @@ def solve_without_columns(gram: FloatArray, cross: FloatArray, fixed: Mask) -> F
 
 
 def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
-    """Solve the normal equations by ridge regression: the ridge acts on the columns that are not `free`."""
+    """Weights (..., c) by ridge regression. ridge: relative to the mean diagonal element, on the columns that are not
+    `free` (c,); these have `RIDGE`."""
     gram, cross = products
     size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
     return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge)) * size, cross[..., None])[..., 0])
 
 
 def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[FloatArray, FloatArray]:
-    """The normal equations with the prior's precision added. products: (..., c, c) and (..., c)."""
+    """The normal equations with the prior added: its precision to the first diagonal elements of X'X, its precision
+    times mean to the first elements of X'y. products: (..., c, c) and (..., c)."""
     if prior is None:
         return products
     gram, cross = products[0].copy(), products[1].copy()
@@ -117,8 +127,8 @@ def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[F
 
 
 def compute_squared_error(own: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
-    """Residual sum of squares of given weights, at least 0. own: Gram matrix and cross products; power: sum of squares
-    of what is fitted."""
+    """Residual sum of squares of given weights (c,), at least 0. own: Gram matrix (c, c) and cross products (c,).
+    power: sum of squares of the fitted force."""
     gram, cross = own
     return max(power - 2 * float(weights @ cross) + float(weights @ gram @ weights), 0.0)
 

@@ -1,4 +1,9 @@
-"""A law with the result of its test: its gain on held-out blocks, with a bound from bootstrap over blocks."""
+"""A law of a force balance with the result of its test on blocks of samples that its parameters were not fitted to.
+
+The test compares two sums of squared force errors E over these blocks: of the chosen laws, and of the same laws without
+this one. Its gain is 1 - E(with it) / E(without it); the lower bound of the gain is from a bootstrap over blocks
+(Kunsch, Ann. Stat. 17:1217, 1989). `judge_laws` and `actuator` run the test and decide which laws are named.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,67 +16,74 @@ from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 
 NO_COLUMN = -1
-"""Index in a regression of a law that changes the force itself."""
+"""Value of `JudgedLaw.place` for a law of the command: it changes the force itself and has no column."""
 DRY_FRICTIONS = {
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
     "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
 }  # fmt: skip
-"""Laws of dry friction, which act alike where a recording moves in a single way."""
+"""Laws of dry friction, whose forces are similar where the recorded motion does not vary."""
 FAMILIES = (
     DRY_FRICTIONS | {"quadratic_damping"},
     {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
 )  # fmt: skip
-"""Effects that act alike. Where a law and its equally good rivals are of one family, it is named with them as its
-class; where a rival is of another family, nothing is named. An effect that is not listed is a family of its own."""
+"""Families of effects with similar forces. A law whose equally good rivals are all of its own family is named, with
+the rivals as its class; a law with such a rival of another family is not named. An unlisted effect is a family of its
+own."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedLaw:
-    """A law with its parameters, its gain, and the reason where it is not named."""
+    """A law with its parameters, its gain on unseen blocks, and the reason not to name it, if there is one."""
 
     place: int
-    """Index of the law in the regression."""
+    """Index of the law in the regression; `NO_COLUMN` for a law of the command."""
     law: Law
     values: dict[str, float]
+    """Parameters of the effect by name; empty where the fitted weights have signs that the effect cannot have."""
     gain: float
-    """Share of the held-out error power that it explains beside the other laws."""
+    """Share of the squared error that the law removes when it is added to the other laws."""
     gain_low: float
-    """Lower confidence bound of the gain, at 97.5 %."""
+    """Lower end of the 95 % bootstrap interval of the gain: the 2.5 % quantile."""
     share: float
-    """The law's share of the gain of all laws together."""
+    """Decrease of the squared error by this law, over the decrease by all laws together; for a law of the command, over
+    the error of the linear balance."""
     alike: tuple[str, ...]
-    """Effects that fit as well in its place (class)."""
+    """Rivals: effects that fit about as well in place of this law."""
     probability: float
-    """Share of bootstrap draws in which none of them has a smaller error."""
+    """Share of bootstrap draws in which no other effect in its place has a smaller error, apart from effects that
+    contain it as a special case."""
     why_not: str
-    """Reason not to name it; empty where it is to be named."""
+    """Reason not to name the law, as a sentence; empty where it is named."""
     stands_for: str = ""
-    """The law that was chosen, where it has no simulation and this one is fitted in its place."""
+    """Effect that was chosen but has no simulation, where `law` replaces it; else empty."""
 
     formula: Formula | None = None
-    """Formula of a law that no catalogue effect simulates."""
+    """Formula for the simulation of a law that is no effect of the catalogue; else None."""
     possible: bool = True
-    """Whether its parameters have physically possible signs and sizes."""
+    """Whether its parameters have physically possible signs, and its force is not many times the recorded force."""
     agreed: bool = False
-    """Whether its gain, over the held-out blocks and the folds that it was chosen by, is significant."""
+    """Whether the law has a gain on the held-out blocks, and a significant gain on these and the cross-validation folds
+    together."""
 
     @property
     def played_as(self) -> str:
-        """The effect of the catalogue, or a law without a name, that simulations play."""
+        """Name of the effect that simulates the law: an effect of the catalogue, or `DISCOVERED_LAW` for a formula."""
         return self.law.effect if self.formula is None else DISCOVERED_LAW
 
     @property
     def has_column(self) -> bool:
-        """Whether it is a term of the regression, not a change of the force itself."""
+        """Whether the law is a term of the regression, rather than a law of the command."""
         return self.place != NO_COLUMN
 
     @property
     def named(self) -> bool:
+        """Whether there is no reason not to name the law."""
         return not self.why_not
 
 
 def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> float:
-    """Standard deviation of a law's own force over that of the recorded force."""
+    """Standard deviation of a law's own force over that of the recorded force, on the samples to fit. laws: fitted
+    together. number: the law among them."""
     columns, place = regression.columns_of(laws), regression.places[number]
     weights = np.zeros(regression.columns[0].shape[1])
     weights[columns] = regression.weights(columns)
@@ -82,10 +94,11 @@ def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> flo
 
 
 def special_cases(effect: str) -> tuple[str, ...]:
-    """Effects that a law contains as special cases: it always fits better than these."""
+    """Effects that a law contains as special cases, and which it therefore fits at least as well as; empty for a law
+    outside the catalogue."""
     return EFFECTS[effect].simpler if effect in EFFECTS else ()
 
 
 def family_of(effect: str) -> set[str]:
-    """Effects that may form a class with this one, itself included; it alone where it is in none of `FAMILIES`."""
+    """The family in `FAMILIES` that contains an effect; the effect alone where none does."""
     return next((family for family in FAMILIES if effect in family), {effect})

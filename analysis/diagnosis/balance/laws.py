@@ -1,11 +1,12 @@
-"""Terms that physics may add to the force balance of a moving axis, each over a grid of its nonlinear parameters.
+"""Candidate terms of the force balance of a moving axis, each on a grid of its nonlinear parameters.
 
-Here: nonlinear springs, end stops, backlash, gravity torque, cogging, linear dynamics of a higher order; friction and
-damping are in `friction_laws`.
+Defined here: nonlinear springs, end stops, backlash, gravity torque, cogging, pose-dependent inertia, an extra mode and
+amplifier lag. Friction and damping are in `friction_laws`; `law` states the balance.
 
-A law's force is linear in its weights: sum of weight times column, with columns from the measured motion. The grids
-span the recording's speeds, travel and band, so that no starting values are needed. A column is in SI units; its sign
-is that of a force which resists the motion, as mass, damping and stiffness of the balance do.
+The force of a law is phi(q, v, a; n)' w: linear in the weights w, with columns phi from the measured motion for given
+nonlinear parameters n. The grids of n span the travel and the band of the recording, so that the search needs no
+starting values. Columns are in SI units and have the sign of a force that resists the motion, as the balance's terms of
+mass, damping and stiffness do.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,27 +29,28 @@ from analysis.diagnosis.balance.motion import Motion
 from equalizer.effects.gravity_torque import LEAST_TRAVEL_RAD
 from equalizer.signals.signal import FloatArray
 
-# The search for pitches of a force that is periodic in the position. By hand.
+# Settings of the search for the pitch of a force that is periodic in the position, all chosen by hand.
 LINE_SPACING = 0.35
-"""Spacing of the lines, over 1 / travel: a peak of a force that is periodic over the whole travel is about 1 / travel
-wide."""
+"""Spacing of the spectral lines, relative to 1 / travel: the spectral peak of a force that is periodic over the whole
+travel is about 1 / travel wide."""
 MOST_LINES = 600
-"""Lines that are looked at, from the longest pitch down: pitches below 1 / 211 of the travel, or of a shaft that turns
-below 1 / 601 of a turn, are not searched."""
+"""Number of lines that are searched, from the longest pitch down: pitches below 1 / 211 of the travel, or below 1 / 601
+of a turn for a shaft that turns, are not found."""
 MOST_SAMPLES = 6000
-"""Samples that the lines are computed from, evenly taken."""
+"""Largest number of samples, evenly spaced, from which the lines are computed."""
 MOST_PITCHES = 4
-"""Lines that are kept, the strongest ones."""
+"""Number of the strongest lines that are kept."""
 STOP_AT = (0.02, 0.05, 0.1, 0.2)
-"""Places of an end stop that are tried: distances from either end of the travel, over the travel."""
+"""Tried positions of an end stop: distances from either end of the travel, relative to the travel."""
 HALF_GAPS = tuple(np.geomspace(0.01, 0.3, 6).tolist())
-"""Half gaps of a backlash that are tried, over the travel."""
+"""Tried half gaps of a backlash, relative to the travel."""
 MODE_RATIOS, MODE_HZ = (0.02, 0.1, 0.4), tuple(np.geomspace(0.02, 1.2, 12).tolist())
-"""Damping ratios, and frequencies over the end of the band, of an extra mode that are tried."""
+"""Tried damping ratios of an extra mode, and tried frequencies relative to the upper end of the band."""
 
 
 def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
-    """All laws of all channels, but `cogging_law`, whose pitch is found from the residual of the others."""
+    """All laws of all channels except `cogging_law`, whose pitch is found from the residual of the others. Laws that
+    need a time axis are left out where the band is infinite."""
     for channel in range(len(motions[0].channels)):
         scales = scales_of(motions, channel, rotational)
         yield from friction_laws(channel, scales)
@@ -66,19 +68,20 @@ def laws_of(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
 
 
 def _longest_pitch(of: Scales) -> float:
-    """Half the travel, or half a turn: an unbalanced or eccentric shaft has a period of one turn."""
+    """Longest pitch (m or rad) of cogging: half the travel; of a rotational axis at most half a turn, because the force
+    of an unbalanced or eccentric shaft has a period of one turn."""
     return min(0.5 * of.travel, np.pi) if of.rotational else 0.5 * of.travel
 
 
 def cogging_law(channel: int, pitch: float, of: Scales) -> Law:
-    """A force that is periodic in the position."""
+    """Cogging: a force that is periodic in the position, a sine and a cosine column. pitch: its period (m or rad)."""
     longest = _longest_pitch(of)
     return Law(
         "cogging", channel, (pitch,),
         lambda m, n: np.hstack(
             [np.sin(2 * np.pi * m.position[:, [channel]] / n[0]), np.cos(2 * np.pi * m.position[:, [channel]] / n[0])]
         ),
-        # Opposite signs: the catalogue's force drives the motion, that of the balance resists it.
+        # Both weights change sign: the catalogue's force drives the motion, that of the balance resists it.
         lambda w, n, mass: {
             "amplitude": float(np.hypot(*w)), "pitch": n[0], "phase": float(np.arctan2(-w[1], -w[0])),
         } if n[0] <= longest else None,
@@ -90,11 +93,12 @@ def likely_pitches(
     motions: Sequence[Motion], remainders: Sequence[FloatArray], channel: int, of: Scales
 ) -> list[float]:
     """Pitches (m or rad) of the strongest lines in the spectrum of the residual force over the position, the strongest
-    first. remainders: per motion, (kept samples,). A shaft that turns has lines at whole numbers per turn alone."""
+    first. remainders: per motion, residual force (kept samples,). For a shaft that turns, only whole numbers of periods
+    per turn are searched."""
     q = np.concatenate([each.position[:: each.step, channel][each.valid_samples(each.fit)] for each in motions])
     residual = np.concatenate([r[each.valid_samples(each.fit)] for each, r in zip(motions, remainders, strict=True)])
     longest = _longest_pitch(of)
-    # Shorter pitches give frequencies above the band's end at the usual speed.
+    # At the rms speed, shorter pitches give frequencies above the end of the band.
     shortest = of.speed / of.band_hz
     if shortest >= longest or not len(residual):
         return []
@@ -108,8 +112,8 @@ def likely_pitches(
 
 
 def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
-    """Gravity torque, nonlinear springs, end stops and backlash along channel c, with start values on grids of its
-    travel. None but gravity torque for a shaft that turns more than twice."""
+    """Gravity torque, nonlinear springs, end stops and backlash along channel c, with starting values on grids over its
+    travel. For a shaft that makes more than two turns: gravity torque only."""
     if of.rotational and of.travel > LEAST_TRAVEL_RAD:
         yield Law(
             "gravity_torque", c, (), lambda m, _: np.hstack([np.sin(m.position[:, [c]]), np.cos(m.position[:, [c]])]),
@@ -126,7 +130,7 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
                 _stop_columns(c, side), _stop_values(side), bounded=((of.low, of.high),),
             )  # fmt: skip
     for half in of.travel * np.array(HALF_GAPS):
-        # Beside the balance's own spring k x this leaves k (x - clip(x)): a spring that acts beyond the gap alone.
+        # Added to the balance's own spring term k x, it gives k (x - clip(x)): a spring that acts beyond the gap only.
         yield Law(
             "backlash", c, (float(half),), lambda m, n: -np.clip(m.position[:, [c]], -n[0], n[0]),
             lambda w, n, mass: {"gap": 2 * n[0], "contact_stiffness": float(w[0])} if w[0] > 0 else None,
@@ -135,7 +139,8 @@ def stiffness_laws(c: int, of: Scales) -> Iterator[Law]:
 
 
 def _stop_values(side: float) -> Values:
-    """Parameters of an end stop on one side; the result states it where the stop is not on that side of zero."""
+    """Parameters of an end stop that blocks motion towards `side` (+1 or -1). They include `side` only where the sign
+    of the position does not imply it. None for a stiffness that is not positive."""
 
     def values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
         beyond = {} if side * n[0] > 0 else {"side": side}
@@ -145,6 +150,7 @@ def _stop_values(side: float) -> Values:
 
 
 def _stop_columns(c: int, side: float) -> Columns:
+    """Column (n, 1): penetration of the stop (m or rad), with the sign of `side`; zero before contact."""
     return lambda m, n: side * np.maximum(side * (m.position[:, [c]] - n[0]), 0.0)
 
 
@@ -152,7 +158,7 @@ def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
     """Pose-dependent inertia, an extra mode on a grid of frequencies and damping ratios, and amplifier lag along
     channel c."""
     if not of.turns:
-        # Lagrange's equation of a mass M (1 + c x): beside M a, the force M c (x a + v² / 2).
+        # Lagrange's equation of a mass M (1 + c x) adds M c (x a + v² / 2) to M a; the weight is M c.
         yield Law(
             "pose_dependent_inertia", c, (),
             lambda m, _: m.position[:, [c]] * m.acceleration[:, [c]] + 0.5 * m.velocity[:, [c]] ** 2,
@@ -164,7 +170,7 @@ def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
                 "extra_mode", c, (float(f), ratio), lambda m, n: _mode_force(m, c, n), _mode_values, linear=True,
                 bounded=((0.005 * of.band_hz, 1.5 * of.band_hz), (0.002, 1.0)),
             )  # fmt: skip
-    # A first-order lag of the force needs (1 + T s) times it; of that, T s M a is the part that no base term holds.
+    # With a first-order lag, the command is (1 + T s) times the delivered force. Only T s M a is no base term.
     yield Law(
         "amplifier_lag", c, (), lambda m, _: filter_from_rest(m.acceleration[:, [c]], m.rate_hz, lambda s: s),
         lambda w, n, mass: {"time_constant": float(w[0] / mass)} if mass > 0 and w[0] > 0 else None, linear=True,
@@ -172,7 +178,8 @@ def dynamic_laws(c: int, of: Scales) -> Iterator[Law]:
 
 
 def _mode_force(m: Motion, c: int, n: Numbers) -> FloatArray:
-    """(n, 1): force per kg of a body that is attached to the axis by a spring and a damper."""
+    """(n, 1): force per kg of a body on a spring and damper at the axis: the axis acceleration times
+    (omega² + 2 zeta omega s) / (s² + 2 zeta omega s + omega²). n: frequency (Hz) and damping ratio zeta."""
     turn, loss = 2 * np.pi * n[0], 2 * n[1] * 2 * np.pi * n[0]
     return filter_from_rest(
         m.acceleration[:, [c]], m.rate_hz, lambda s: (turn**2 + loss * s) / (s**2 + loss * s + turn**2)
@@ -180,4 +187,5 @@ def _mode_force(m: Motion, c: int, n: Numbers) -> FloatArray:
 
 
 def _mode_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    """Frequency (Hz), mass (kg or kg m²) and damping ratio of the mode; None for a mass that is not positive."""
     return {"frequency": n[0], "mass": float(w[0]), "damping_ratio": n[1]} if w[0] > 0 else None

@@ -1,9 +1,10 @@
-"""A given model as the base of a force balance: the force that it needs, and its sensitivity to the free parameters.
+"""A given model as the base of a force balance: the force that it requires, and its sensitivity to free parameters.
 
-Both are columns: the first has the weight 1, the others a prior of 0 ± 1, because they are counted in standard
-deviations of the calibration. The weight of the data against that prior follows from the residual: its power per degree
-of freedom, of which a residual with a narrow spectrum has few (equivalent degrees of freedom of a power estimate;
-Bendat and Piersol 2010, Random Data, ch. 8).
+Both are columns of a linear regression of the measured force. The column of the required force has the fixed weight 1.
+The other columns are the change of that force per standard deviation of each parameter's calibration, so that their
+weights have the prior N(0, 1). The precision of this prior in the normal equations is the variance of the residual: its
+sum of squares per degree of freedom, of which a residual with a narrow spectrum has few (equivalent degrees of freedom
+of a power estimate; Bendat and Piersol 2010, Random Data, ch. 8).
 """
 
 from collections.abc import Sequence
@@ -17,25 +18,26 @@ from analysis.diagnosis.balance.regression import Regression, fit_all_laws, regr
 from equalizer.signals.signal import FloatArray
 
 FIXED = 1e6
-"""Precision of the prior of the weight 1, relative to the data's information on it: large enough to fix it."""
+"""Precision of the prior that fixes the first weight at 1, relative to the precision that the data give to it: large
+enough that the data do not move it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GivenBase:
-    """A given model's columns along one axis, in place of free mass, damping and stiffness."""
+    """Columns of a given model along one axis, which replace free mass, damping and stiffness."""
 
     columns: tuple[FloatArray, ...]
-    """Per motion, (n, 1 + parameters): the force that the model needs along the measured motion, and its change per
-    standard deviation of each free parameter; at the recording's rate."""
+    """Per motion, (n, 1 + parameters), N (N m): the force that the model requires along the measured motion, and its
+    change per standard deviation of each free parameter; at the recording's rate."""
     mass: float
     """Mass that moves along the axis, kg (kg m^2)."""
     least: float = 0.0
-    """Least share of the force's rms that all laws together must explain; else none is searched for."""
+    """Smallest share of the force's rms that all laws together must explain; below it no law is searched for."""
 
 
 def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence[Law], given: GivenBase) -> Regression:
-    """Build the regression of `regression_of` with the model's required force as its base. Free parameters that hardly
-    change the force are left out."""
+    """Build the regression of `regression_of` with the model's required force and its sensitivities as the base. Free
+    parameters that change the force by less than 1e-9 of its rms are left out."""
     varying = _sensitive_columns(given)
     columns = [each[:, varying] for each in given.columns]
     plain = replace(regression_of(motions, axis, laws, False, None, columns), mass=given.mass)
@@ -49,19 +51,22 @@ def regression_beside_model(motions: Sequence[Motion], axis: int, laws: Sequence
 
 
 def takes_enough(plain: Regression, least: float) -> bool:
-    """Whether all laws together explain at least this share of the force, in the mean over the folds."""
+    """Whether all laws together lower the cross-validated sum of squares by more than least² of the force's power, so
+    that they explain more than the share `least` of its rms."""
     alone = float(plain.cross_validated_errors(plain.columns_of(())).sum())
     whole = fit_all_laws(plain, range(plain.columns[0].shape[1]))[0]
     return alone - whole > least**2 * sum(block.signal for block in plain.fit)
 
 
 def _sensitive_columns(given: GivenBase) -> list[int]:
+    """Indices of the required force and of the parameters that change it by more than rounding."""
     size = np.sqrt(np.mean(np.vstack(given.columns) ** 2, axis=0))
     return [0, *(k for k in range(1, len(size)) if size[k] > 1e-9 * size[0])]
 
 
 def _power_per_freedom(plain: Regression) -> float:
-    """Residual sum of squares over its degrees of freedom, with the free parameters fitted without their prior."""
+    """Residual sum of squares per equivalent degree of freedom; the free parameters are fitted without their prior.
+    With the residual's power P on each spectral line, a motion has 2 (sum P)² / sum P² degrees of freedom."""
     residuals = plain.remainder(plain.columns_of(()))
     power, freedom = 0.0, 0.0
     for residual, motion in zip(residuals, plain.motions, strict=True):

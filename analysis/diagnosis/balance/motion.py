@@ -1,9 +1,10 @@
 """Positions, velocities, accelerations and forces from one part of a recording.
 
-Differentiation is done line by line of the spectrum, below a band's end that is the highest at which the motion's white
-noise makes at most a hundredth of the acceleration's mean square: regression on a noisier acceleration would
-underestimate the mass by more (errors in variables; Soderstrom, Automatica 43:939, 2007). Accelerations are integrated
-above the lower end of the band, found likewise from the position, because below it their integrals are drift.
+Derivatives are computed in the frequency domain: each spectral line is multiplied by (i omega)^order and low-pass
+filtered. The upper end of the band is the highest frequency up to which white noise makes at most a hundredth of the
+acceleration's mean square, because regression on a noisier acceleration would underestimate the mass by more (errors in
+variables; Soderstrom, Automatica 43:939, 2007). Measured accelerations are integrated above a lower end of the band
+only, below which noise would dominate the position (`band.py` computes both ends).
 """
 
 from collections.abc import Iterable, Sequence
@@ -30,7 +31,8 @@ class NoMotionError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """A recorded condition that changes within the recordings."""
+    """A recorded condition that changes within the recordings, such as a temperature, with its mean and spread there,
+    in its own unit."""
 
     name: str
     """Name in a formula."""
@@ -41,18 +43,21 @@ class Condition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """One part of a recording; all arrays at the recording's rate, band-limited except the force."""
+    """Motion and force in one part of a recording, in SI units; all arrays at the recording's rate. Position, velocity
+    and acceleration, (n, d) each, are band-limited; force and conditions are not."""
 
     rate_hz: float
+    """Sample rate in Hz."""
     band_hz: float
-    """End of the band in Hz; infinite without a time axis: then nothing is filtered, and there are no accelerations."""
+    """Upper end of the band in Hz; infinite without a time axis: then nothing is filtered, and accelerations are 0."""
     step: int
-    """Decimation after filtering: one of this many samples is kept."""
+    """Decimation factor after filtering: every `step`-th sample is kept."""
     channels: tuple[str, ...]
     order: int
     """Order of the position's time derivative that was measured: 0, 1 or 2."""
     position: FloatArray
-    """(n, d): as measured, or integrated from the first sample on."""
+    """(n, d): as measured, or integrated: a velocity by summation from the first sample on, an acceleration in the
+    frequency domain."""
     velocity: FloatArray
     acceleration: FloatArray
     force: FloatArray
@@ -60,7 +65,7 @@ class Motion:
     condition: FloatArray
     """(n, q): recorded conditions such as a temperature, standardised; q may be 0."""
     fit: Mask
-    """(n,): samples to fit and to choose by."""
+    """(n,): samples for estimation: those to fit and those for validation (`Observed.fit`, `Observed.choose`)."""
     test: Mask
     """(n,): held-out samples."""
     lowest_hz: float = 0.0
@@ -87,7 +92,8 @@ class Motion:
 
 
 def motion_signal(recording: Recording) -> Signal | None:
-    """The measured motion of the lowest derivative, of one kind: positions before velocities before accelerations."""
+    """The channels of the lowest time derivative that was measured and varies: positions before velocities before
+    accelerations; None without any."""
     found: list[tuple[int, Signal]] = []
     for signal in (recording.position, recording.response):
         if signal is None:
@@ -110,8 +116,9 @@ def _varies(samples: FloatArray) -> bool:
 
 
 def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:
-    """One motion per record, with derivatives and forces. records: alike in channels, units and rate. band_hz: None =
-    what their noise allows. Raises NoMotionError where no response is a motion."""
+    """One motion per record, with derivatives and forces. records: with the same channels, units and rate. band_hz:
+    upper end of the band; None = the highest that the noise allows. Raises NoMotionError where there are no records, or
+    a record contains no motion."""
     signals = [motion_signal(record.recording) for record in records]
     if not signals or any(signal is None for signal in signals):
         raise NoMotionError("no response is a motion")
@@ -131,7 +138,8 @@ def motions_of(records: Sequence[Observed], band_hz: float | None = None) -> tup
 
 
 def motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) -> float:
-    """The highest frequency of the motion of some channels; inf without a time axis. columns: their numbers."""
+    """Frequency in Hz below which `MOVING_BAND_SHARE` of a channel's mean square velocity lies, the highest over the
+    channels; infinite without a time axis. columns: indices of the channels."""
     if not np.isfinite(motions[0].band_hz):
         return np.inf
     ends = []
@@ -155,9 +163,11 @@ def _motion(
     condition: FloatArray,
     names: tuple[str, ...],
 ) -> Motion:
+    """Motion of one record. measured: samples (n, d) and the order of their time derivative; band: upper and lower end
+    in Hz; condition: (n, q), standardised; names: channels of the motion."""
     (samples, order), (band_hz, lowest_hz) = measured, band
     rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
-    # A held command is centred half a sample after the reading.
+    # Under a zero-order hold a command acts, in the mean, half a sample after the reading: the motion is shifted to it.
     early_s = 0.5 / rate_hz if hold is Hold.ZERO_ORDER and not record.recording.meta.get("imposed") else 0.0
     if not np.isfinite(band_hz):
         return _motion_without_clock(record, samples, condition, names)
@@ -165,7 +175,7 @@ def _motion(
         _derivative(samples, rate_hz, (band_hz, lowest_hz), wanted - order, early_s) for wanted in range(3)
     )
     if is_read_as_free(record.recording):
-        # The acceleration is the negative force here: no law may use it.
+        # The command of a free motion was computed from its acceleration, so that no law may use the acceleration.
         acceleration = np.zeros_like(acceleration)
     return Motion(
         rate_hz, band_hz, max(int(rate_hz / (MOTION_OVERSAMPLED * band_hz)), 1), names, order, position, velocity,
@@ -174,11 +184,13 @@ def _motion(
 
 
 def band_pass(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
-    """(n, k): columns with their spectrum outside the band removed, without a phase shift."""
+    """(n, k): columns band-pass filtered between `lowest_hz` and `band_hz` without a phase shift; low-pass filtered
+    where `lowest_hz` is 0."""
     return filter_spectrum(columns, rate_hz, lambda f: _band_gain(f, band_hz, lowest_hz))
 
 
 def _band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
+    """(lines,): real gain of the band-pass filter, of the low-pass filter alone where `lowest_hz` is 0."""
     shaped = low_pass_gain(frequency_hz, band_hz)
     return np.asarray(shaped * (1 - low_pass_gain(frequency_hz, lowest_hz)) if lowest_hz > 0 else shaped)
 
@@ -186,7 +198,8 @@ def _band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> Fl
 def _motion_without_clock(
     record: Observed, samples: FloatArray, condition: FloatArray, names: tuple[str, ...]
 ) -> Motion:
-    """Motion of a recording without a time axis: positions, and the sign of their change from sample to sample."""
+    """Motion of a recording without a time axis: positions, their change per sample as velocity, and no
+    acceleration."""
     return Motion(
         record.recording.sample_rate_hz, np.inf, 1, names, 0, samples, np.gradient(samples, axis=0),
         np.zeros_like(samples), fill_gaps(record.command), condition, record.fit | record.choose, record.test,
@@ -196,8 +209,9 @@ def _motion_without_clock(
 def _derivative(
     samples: FloatArray, rate_hz: float, band: tuple[float, float], times: int, early_s: float
 ) -> FloatArray:
-    """The derivative of order `times`; an integral where that is negative. Integrals of an acceleration are high-passed
-    at the lower end of the band; the acceleration itself is not, like the force."""
+    """(n, k): the time derivative of order `times`; an integral where that is negative. band: upper and lower end in
+    Hz. early_s: time in s by which the result is advanced. Integrals of an acceleration are high-pass filtered at the
+    lower end of the band; the acceleration itself is not, like the force."""
     band_hz, lowest_hz = band
     line, slope = _end_to_end_line(samples, rate_hz)
 
@@ -207,7 +221,7 @@ def _derivative(
         return np.asarray(shaped * np.exp(turn * early_s) * turn**times)
 
     if times < 0 and lowest_hz == 0:
-        # The integral of a velocity is not periodic: it is summed in time instead of divided by frequency.
+        # The integral of a velocity is not periodic: it is summed in time instead of divided by i omega.
         smooth = _derivative(samples, rate_hz, band, 0, early_s)
         return np.asarray(np.cumsum(smooth, axis=0) / rate_hz)
     if times < 0:
@@ -229,7 +243,9 @@ def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, times: in
 
 
 def filter_spectrum(samples: FloatArray, rate_hz: float, gain: object, straightened: bool = True) -> FloatArray:
-    """(n, k): samples times a frequency response `gain` (of Hz), continued as an odd function beyond both ends."""
+    """(n, k): samples filtered in the frequency domain. gain: function of the frequencies in Hz (lines,) that returns
+    the frequency response (lines,). Samples are continued beyond both ends by an odd extension. straightened: whether
+    the line between the end points is removed before and added after filtering."""
     line = _end_to_end_line(samples, rate_hz)[0] if straightened else np.zeros_like(samples)
     whole = odd_extension(samples - line)
     spectrum = rfft(whole, axis=0)
@@ -238,13 +254,15 @@ def filter_spectrum(samples: FloatArray, rate_hz: float, gain: object, straighte
 
 
 def _end_to_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
+    """The straight line from the first to the last sample, (n, k), and its slope per second, (k,)."""
     along = np.linspace(0.0, 1.0, len(samples))[:, None]
     line = (1 - along) * samples[0] + along * samples[-1]
     return np.asarray(line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
 
 
 def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:
-    """The conditions that change, and their standardised samples, (n, q) per record."""
+    """The conditions that change, and their samples (n, q) per record, standardised to mean 0 and standard deviation 1
+    over all records; none where the records differ in their conditions."""
     signals = [getattr(record.recording, "condition", None) for record in records]
     if len({None if signal is None else signal.channels for signal in signals}) > 1 or signals[0] is None:
         return (), [np.zeros((len(record.command), 0)) for record in records]

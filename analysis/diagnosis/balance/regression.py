@@ -1,9 +1,11 @@
-"""Products of all laws' columns, block by block, from which any sum of laws is fitted and tested without another pass
-over the samples.
+"""Linear regression of the force of one axis, f = X w + e, on a base and on the columns of candidate laws (`law.py`).
 
-The base of each balance is mass, damping and stiffness along every measured motion, linear dynamics of a higher order
-where there are any (`BaseTerms`), and a constant. Errors are those of the force within the band. A fold's error is that
-of parameters fitted to all other folds (Stone, J. R. Stat. Soc. B 36:111, 1974).
+The products X'X and X'f of all columns are computed once per block of samples (`blocks.py`). From them any sum of laws
+is fitted and tested without another pass over the samples.
+
+The base is mass, damping and stiffness along every measured motion, linear dynamics of a higher order where there are
+any (`BaseTerms`), and a constant. Errors are sums of squares of the force within the band. In cross-validation, the
+error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111, 1974).
 """
 
 from collections.abc import Sequence
@@ -41,33 +43,39 @@ class Regression:
 
     motions: tuple[Motion, ...]
     axis: int
+    """Index of the force's channel."""
     laws: tuple[Law, ...]
     beside: BaseTerms
+    """Terms of the base in addition to mass, damping and stiffness."""
     base: int
     """Number of columns of the base, which come first: mass, damping, stiffness, further linear laws, and a
     constant."""
     matrices: int
-    """Number of mass, damping and stiffness columns."""
+    """Number of mass, damping and stiffness columns, or of those of a given model."""
     positive: tuple[int, ...]
-    """Columns whose weights must not be negative. A single one is listed twice: the length also limits the active-set
-    steps."""
+    """Columns whose weights must not be negative: mass and damping of the driven motion. The active-set method makes
+    one step fewer than there are entries, so that the mass is listed twice; the single entry of a given model means no
+    step, because its prior fixes that weight."""
     places: tuple[slice, ...]
-    """Each law's columns."""
+    """Range of columns of each law."""
     scale: FloatArray
     """(k,): rms of each column, by which the columns are divided in the products."""
     columns: tuple[FloatArray, ...]
-    """Per motion, (kept samples, k)"""
+    """Per motion, (kept samples, k): X, filtered to the band, decimated, in the columns' own units."""
     force: tuple[FloatArray, ...]
-    """Per motion, (kept samples,)"""
+    """Per motion, (kept samples,): force in N (N m), filtered and decimated likewise."""
     fit: tuple[Block, ...]
+    """Blocks of the samples to fit, with the products of the scaled columns."""
     test: tuple[Block, ...]
+    """Blocks of the held-out samples."""
     prior: Prior = None
-    """Prior of a given model's free parameters."""
+    """Gaussian prior of a given model's free parameters; None without such a model."""
     mass: float | None = None
-    """Mass of a given model in kg (kg m^2); None = the weight of the driven motion's acceleration."""
+    """Mass of a given model in kg (kg m^2); None = it is estimated, as the weight of the driven acceleration."""
 
     def columns_of(self, laws: Sequence[int]) -> list[int]:
-        """Column indices of the base and of these laws. A law of the command, numbered below zero, has none."""
+        """Column indices of the base and of the laws with these indices. A law of the command has a negative index and
+        no columns."""
         more = [k for law in laws if law >= 0 for k in range(self.places[law].start, self.places[law].stop)]
         return [*range(self.base), *more]
 
@@ -76,13 +84,14 @@ class Regression:
         return np.asarray(self._solve_nonnegative(sum_products(self.fit, columns)) / self.scale[list(columns)])
 
     def cross_validated_errors(self, columns: Sequence[int]) -> FloatArray:
-        """(blocks,): each fit block's sum of squares with weights fitted to the other blocks (leave one block out)."""
+        """(blocks,): residual sum of squares of each fit block, with weights fitted to the other blocks
+        (leave-one-block-out cross-validation)."""
         own = products_per_block(self.fit, columns)
         weights = self._solve_nonnegative((own[0].sum(axis=0) - own[0], own[1].sum(axis=0) - own[1]))
         return compute_squared_errors(self.fit, own, weights)
 
     def held_out_errors(self, columns: Sequence[int]) -> FloatArray:
-        """(blocks,): each test block's sum of squares."""
+        """(blocks,): residual sum of squares of each test block, with weights fitted to all fit blocks."""
         return compute_squared_errors(
             self.test,
             products_per_block(self.test, columns),
@@ -90,8 +99,9 @@ class Regression:
         )
 
     def _solve_nonnegative(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Weights (..., c) from products (..., c, c) and (..., c): least squares with mass and damping of the driven
-        motion held at zero where they would be negative (active set)."""
+        """Weights (..., c) from products (..., c, c) and (..., c): least squares in which mass and damping of the
+        driven motion are fixed at zero where they would be negative (active-set method). A fixed weight is not freed
+        again."""
         gram, cross = products = with_prior(products, self.prior)
         found = solve_normal_equations(products, RIDGE)
         places = list(self.positive)
@@ -108,7 +118,7 @@ class Regression:
         return np.where(bound, 0.0, found)
 
     def remainder(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
-        """Per motion, (kept samples,): the residual force."""
+        """Per motion, (kept samples,): the residual force f - X w, with the weights fitted to all fit blocks."""
         found = self.weights(columns)
         return tuple(
             force - rows[:, list(columns)] @ found for force, rows in zip(self.force, self.columns, strict=True)
@@ -123,9 +133,10 @@ def regression_of(
     beside: BaseTerms | None = None,
     bases: Sequence[FloatArray] | None = None,
 ) -> Regression:
-    """The regression of the force of one axis on mass, damping, stiffness and laws. turns: see `Scales`. beside: None =
-    the force drives the motion of its own number. bases: per motion (n, k), in place of mass, damping and stiffness.
-    Laws whose columns vanish or are not finite are left out."""
+    """The regression of the force of one axis on mass, damping, stiffness and laws. turns: whether the shaft turns
+    freely (`Scales.turns`) and so has no stiffness. beside: further terms of the base; None = none, and the force
+    drives the motion channel of the same index. bases: columns (n, k) per motion that replace mass, damping and
+    stiffness. Laws whose columns vanish or are not finite are left out."""
     d = len(motions[0].channels)
     beside = beside or BaseTerms(min(axis, d - 1))
     aims = [each.decimate(each.force[:, [axis]])[:, 0] for each in motions]
@@ -160,29 +171,33 @@ def signal_power(blocks: Sequence[Block]) -> float:
 
 
 def _linear_columns(motion: Motion, turns: bool, beside: Sequence[Law]) -> FloatArray:
-    """(n, k): acceleration, velocity, position and linear laws. turns: a freely rotating shaft has no spring."""
+    """(n, k): acceleration, velocity, position and linear laws; no position where a shaft turns freely, because it has
+    no spring."""
     more = [law.columns(motion, law.numbers) for law in beside]
     return np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *more])
 
 
 def _base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
+    """(kept samples, k + 1): filtered and decimated base columns, then the constant."""
     return np.hstack([motion.decimate(linear), np.ones((len(linear[:: motion.step]), 1))])
 
 
 def _law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
-    """A law's columns per motion; None where they vanish or are not finite."""
+    """A law's filtered and decimated columns per motion; None where any vanishes or is not finite."""
     columns = [motion.decimate(law.columns(motion, law.numbers)) for motion in motions]
     usable = all(np.isfinite(each).all() for each in columns) and all(_has_size(columns))
     return columns if usable else None
 
 
 def _has_size(columns: Sequence[FloatArray]) -> Mask:
+    """(k,): whether each column's rms is above rounding errors of the law's largest column."""
     size = np.sqrt(np.mean(np.vstack(columns) ** 2, axis=0))
     return np.asarray(size > 1e-12 * max(float(size.max(initial=0.0)), 1e-290))
 
 
 def replace_law(regression: Regression, number: int, law: Law) -> Regression | None:
-    """The regression with a law replaced by another with as many columns; None where its columns vanish."""
+    """The regression with the law of this index replaced; None where the new law's columns vanish, are not finite or
+    differ in number from those of the old law."""
     place = regression.places[number]
     columns = _law_columns(regression.motions, law)
     if columns is None or columns[0].shape[1] != place.stop - place.start:
@@ -203,7 +218,8 @@ def replace_law(regression: Regression, number: int, law: Law) -> Regression | N
 
 
 def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
-    """The regression with more laws after those that it has."""
+    """The regression with laws added after the present ones. Laws whose columns vanish or are not finite are left
+    out."""
     kept, rows = [], [[each] for each in regression.columns]
     ends = [regression.columns[0].shape[1]]
     for law in laws:
@@ -231,7 +247,7 @@ def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
 
 
 def keep_laws(regression: Regression, laws: Sequence[int]) -> Regression:
-    """The regression with these laws alone, in this order."""
+    """The regression with only the laws of these indices, in this order."""
     columns = regression.columns_of(laws)
     sizes = [regression.places[k].stop - regression.places[k].start for k in laws]
     ends = np.cumsum([regression.base, *sizes]).tolist()
@@ -247,6 +263,7 @@ def keep_laws(regression: Regression, laws: Sequence[int]) -> Regression:
 
 
 def _select_columns(block: Block, columns: Sequence[int]) -> Block:
+    """The block with the products of these columns only, in this order."""
     return replace(block, gram=block.gram[np.ix_(columns, columns)], cross=block.cross[list(columns)])
 
 
@@ -261,8 +278,9 @@ def _renew_products(regression: Regression, block: Block, place: slice) -> Block
 
 
 def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float, FloatArray]:
-    """Sum of squares with all these columns, the laws' weights shrunk by the ridge that cross-validation chooses: the
-    cross-validated one, and that of each test block (blocks,). A lower bound for sums of a few laws."""
+    """Ridge regression on all these columns: the cross-validated sum of squares, and that of each test block (blocks,).
+    The ridge parameter is the one of `RIDGES` with the least cross-validated error; it does not act on the base. The
+    result estimates the least error that a sum of a few laws can reach."""
     free = np.array([k < regression.base for k in columns])
     own = products_per_block(regression.fit, columns)
     whole = own[0].sum(axis=0), own[1].sum(axis=0)

@@ -1,9 +1,9 @@
-"""The force balance with a given model as its base, whose free parameters are columns with the prior of their
-calibration.
+"""Force balance with a given mechanical model as its base: which laws are missing in that model?
 
-The force that the model needs is computed along the measured motion, with everything that its file names: actuator,
-modes, effects. Laws are then tested as for a fitted model (`balance.judge_laws`), by their gain on held-out data over
-the re-tuned model.
+Inverse dynamics give the force that the model requires for the measured motion, with its actuator, modes and effects.
+The base of the regression (`balance.model_base`) consists of that force and its derivatives with respect to the model's
+free parameters, which have the prior of their calibration. Laws are then tested as for a fitted model
+(`balance.judge_laws`), by their gain on held-out data over the re-tuned model.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,15 +33,17 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 FINEST = 6.0
-"""Least samples per period of the band's end at which laws are computed, so that their harmonics are not aliased."""
+"""Least samples per period of the band's upper end at which laws are computed, so that harmonics of nonlinear laws are
+not aliased into the band."""
 DIFFERENCE_STEP = 0.1
-"""Step of the finite differences, in standard deviations of the calibration."""
+"""Step of the finite differences for the parameters of modes, in standard deviations of the calibration."""
 
 
 def find_balances_beside_model(
     recordings: Sequence[Recording], model: MechanicalModel, without: frozenset[str], time_left: TimeBudget
 ) -> tuple[Balance, ...]:
-    """One balance per command; empty where not each command drives a measured position or velocity."""
+    """One balance per command; empty where a command drives no measured position or velocity, where there is no time
+    axis, or where the model's inverse dynamics cannot be computed. without: names of effects that are not tested."""
     records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
         return ()
@@ -66,20 +68,24 @@ def find_balances_beside_model(
 
 
 def _select_axis(motion: Motion, axis: int) -> Motion:
-    """The motion of one axis alone: the catalogue has no laws of another axis's motion."""
+    """The motion of one axis alone: laws that depend on the motion of another axis are not tested."""
     selected = {name: getattr(motion, name)[:, [axis]] for name in ("position", "velocity", "acceleration")}
     return replace(motion, channels=motion.channels[axis : axis + 1], **selected)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _BalanceData:
+    """One record along the m driven axes, decimated to `FINEST` samples or more per period of the band's upper end."""
+
     motion: Motion
-    """The motion of the driven axes, and the actuator's force there."""
+    """Motion of the driven axes; its force is that of the actuators and known effects there, in N (N m)."""
     columns: tuple[FloatArray, ...]
-    """Per axis, the columns of `GivenBase`."""
+    """Per axis, the columns of `GivenBase`, (n, 1 + parameters)."""
 
 
 def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _BalanceData:
+    """Motion, force and base columns of one record. Raises LinAlgError where the model's outputs do not determine its
+    motion."""
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
     known = effects_under_conditions(place_recorded_effects(model, recording), recording)
     at = _structure(add_carried_weight(model, recording), known)
@@ -101,8 +107,8 @@ def _balance_data(record: Observed, motion: Motion, model: MechanicalModel) -> _
 
 
 def _make_grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
-    """(n, m) each: force of one standard deviation of mass, damping and stiffness at the driven axes, in the order of
-    `Tuning`."""
+    """(n, m) each: change of the required force per standard deviation of each entry of mass, damping and stiffness at
+    the driven axes, in the order of `Tuning`. It is exact, because the force is linear in these entries."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
     pairs = [(i, j) for i in range(m) for j in range(i, m)]
     length = np.linalg.norm(model.input, axis=0)
@@ -117,7 +123,8 @@ def _make_grounded_columns(motion: Motion, model: MechanicalModel, recording: Re
 def _mode_columns(
     motion: Motion, model: MechanicalModel, recording: Recording, known: Sequence[PlacedEffect]
 ) -> Iterator[FloatArray]:
-    """(n, m) each: force of one standard deviation of each parameter of the modes."""
+    """(n, m) each: change of the required force per standard deviation of each parameter of the modes, by forward
+    differences."""
     tuning, m = tuning_of(model, recording.command.channels), model.inputs
     first = 3 * m * (m + 1) // 2
     if first == len(tuning.names):
@@ -133,4 +140,5 @@ def _mode_columns(
 
 
 def _structure(model: MechanicalModel, known: Sequence[PlacedEffect]) -> MechanicalModel:
+    """The linear model changed by those known effects that alter its masses, dampers or springs."""
     return bodies_of(model, [effect for effect in known if isinstance(effect.effect.acts, Structure)]).structure

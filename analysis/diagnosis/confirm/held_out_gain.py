@@ -1,7 +1,9 @@
-"""The share of the held-out error power that an effect takes, with an interval by block bootstrap.
+"""Share of the held-out error power that an effect explains, with a 95 % interval by block bootstrap.
 
-No model of a real device reaches the sensors' noise, so that an effect is judged by its prediction of held-out samples,
-not by the residual in units of noise. Stretches are resampled as blocks, because residuals are correlated (Kunsch, Ann.
+    gain = 1 - mean over channels of (E_with / E_without),    E: sum of squared residuals on held-out samples
+
+No model of a real device reaches the sensors' noise, so an effect is judged by its prediction of held-out samples, not
+by the residual in units of noise. Stretches are resampled as blocks, because residuals are correlated (Kunsch, Ann.
 Stat. 17:1217, 1989).
 """
 
@@ -19,9 +21,10 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class HeldOutGain:
-    """Shares of the error power that an effect explains, in the mean over the channels."""
+    """Share of the held-out error power that an effect explains (at most 1), with its interval."""
 
     gain: float
+    """Estimate from all stretches; below 0 where the effect makes the prediction worse."""
     low: float
     """Lower bound of the 95 % interval."""
     high: float
@@ -29,8 +32,8 @@ class HeldOutGain:
 
 
 def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: FittedCandidate) -> HeldOutGain | None:
-    """The gain of one candidate over another. measure: with the held-out samples, as both candidates' fits. None where
-    too little is held out."""
+    """The gain of the candidate `with_it` over the candidate `without`, both fitted with this measure. None where fewer
+    than `LEAST_HELD_OUT_STRETCHES` are held out, or where a residual is not finite."""
     left, right = (_powers(measure, each) for each in (without, with_it))
     if len(left) < LEAST_HELD_OUT_STRETCHES or not (np.isfinite(left).all() and np.isfinite(right).all()):
         return None
@@ -44,21 +47,22 @@ def held_out_gain(measure: ErrorMeasure, without: FittedCandidate, with_it: Fitt
 
 
 def predicts_something(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
-    """Whether a completed model predicts a held-out motion better than its mean would: a law that only stabilises an
-    unstable model does not. Channels that contain only noise do not count. True where forces are compared, or no motion
-    is held out."""
+    """Whether the model with its effects predicts a held-out motion better than the mean of that motion does. A law
+    that only stabilises an unstable model fails this test. Channels that contain only noise are not counted. True
+    without a test where forces are compared, or where no motion is held out."""
     return measure.name == "predicted force" or _share_left(measure, candidate, 0.0) < 1
 
 
 def explains_half(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
-    """Whether a completed model explains at least half of the held-out power beyond noise: with less, a law may only be
-    the best substitute for one that was not found. True where no motion is held out."""
+    """Whether the model with its effects explains more than half of the held-out power beyond noise. With less, its law
+    may only be the best substitute for a law that was not found. True where no motion is held out."""
     return predicts_something(measure, candidate) and _share_left(measure, candidate, 1.0) < 0.5
 
 
 def _share_left(measure: ErrorMeasure, candidate: FittedCandidate, noise_taken: float) -> float:
-    """Share of the held-out signal power that is left, in the mean over the channels that hold more than noise.
-    noise_taken: 1 to count out what noise alone leaves of both, 0 to count it in."""
+    """Mean over channels of (e^2 - k n^2) / (s^2 - k n^2) on held-out samples: rms residual e, rms signal s, rms noise
+    n, and k = noise_taken (1 subtracts the noise power, 0 does not). Channels with s up to `HELD_OUT_SURPRISE` n are
+    left out; 0 where none remains, or nothing is held out."""
     masks = [record.test for record in measure.records]
     if not any(mask.any() for mask in masks):
         return 0.0
@@ -72,7 +76,8 @@ def _share_left(measure: ErrorMeasure, candidate: FittedCandidate, noise_taken: 
 
 
 def _powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:
-    """(stretches, c): sums of squares of the held-out residuals."""
+    """(stretches, c): sums of squares of the held-out residuals, in units of `measure.unit`. All records together are
+    cut into about `HELD_OUT_STRETCHES` consecutive stretches, at least one per record."""
     total = sum(int(record.test.sum()) for record in measure.records)
     found = []
     for record, residuals in zip(measure.records, candidate.fitted.residuals, strict=True):

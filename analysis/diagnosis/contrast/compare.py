@@ -1,15 +1,16 @@
 """Tests which fault explains the difference between faulty and clean recordings of one device.
 
-With E(f) the sum of squared whitened errors of one base that is fitted to both sets at once, with fault f undone in the
-faulty set (`compared_base`, `joint_products`), the gain of f is
+A base is a regression model of the recordings: a force balance or an autoregressive model. E(f) is the sum of squared
+whitened errors of a base that is fitted to both sets jointly, with fault f undone in the faulty set (`compared_base`,
+`joint_products`). The gain of f is
 
     gain(f) = E(none) / E(f) - 1.
 
-No real device repeats itself exactly, and a flexible fault gains a little anywhere. As negative control, the same gain
-is therefore computed between stretches of one set, where no fault can have come or gone; the median of these gains is
-subtracted. A confidence bound of the rest comes from resampling blocks (bootstrap), standard errors of a fault's values
-from leaving out blocks in turn (delete-a-group jackknife; Efron and Tibshirani, An Introduction to the Bootstrap, 1993,
-chapter 11).
+No real device repeats itself exactly, and a fault with free parameters gains a little on any data. As negative control,
+the same gain is computed between stretches of one set, where no fault can have appeared; E(f) is raised by the median
+of these gains. A confidence bound of the corrected gain comes from resampling blocks (bootstrap), standard errors of a
+fault's values from leaving out groups of blocks in turn (delete-a-group jackknife; Efron and Tibshirani, An
+Introduction to the Bootstrap, 1993, chapter 11).
 """
 
 from collections.abc import Iterator, Sequence
@@ -57,18 +58,20 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 SIXTHS, THIRDS = (tuple(tuple(ALL[k : k + size]) for k in ALL[::size]) for size in (len(ALL) // 6, len(ALL) // 3))
-"""Consecutive blocks of a set."""
+"""The blocks of a set in six and in three groups of consecutive blocks."""
 FOLDS = len(SIXTHS)
 """Groups of blocks of each set that are left out in turn (jackknife)."""
 APART = (*THIRDS, ALL[: CONTRAST_BLOCKS // 2])
-"""Blocks of a set that are compared with its other blocks, thirds and halves, as if they were separate recordings."""
+"""Stretches for the negative control: each third and the first half of a set's blocks, which are compared with its
+other blocks as if they were separate recordings."""
 
 
 def compare(
     recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
 ) -> Comparison | None:
-    """Comparison of the faulty recordings with the clean ones. None where there is too little data, no base fits, or
-    one set moves far less than the other."""
+    """Comparison of the faulty recordings with the clean ones, by the first kind of base that fits: force balances,
+    else autoregressive models. without: names of effects that are not tested. None where there is too little data, no
+    base fits, or one set moves far less than the other."""
     sides = split_into_parts(clean), split_into_parts(recordings)
     if not all(sides) or not move_alike(*sides):
         return None
@@ -84,8 +87,8 @@ def compare(
 def _set_up(
     clean: tuple[Part, ...], faulty: tuple[Part, ...], bases: Sequence[Base], motions: tuple[Motion, ...]
 ) -> tuple[list[ComparedBase], list[Fault]]:
-    """The bases on both sets, with those of one sensor by another, and all faults that the recordings may have. Faults
-    of the mechanism need velocities, and so a time axis; where the motion was imposed, no actuator made it."""
+    """The bases on both sets, including those that predict one sensor from another, and all faults to test. Faults of
+    the mechanism need velocities and so a time axis; an imposed motion was not produced by an actuator."""
     recording = clean[0].recording
     by_force = isinstance(bases[0], ForceBase)
     timed = bool(motions) and np.isfinite(motions[0].band_hz)
@@ -116,6 +119,7 @@ def _set_up(
 
 
 def _judge_faults(compared_bases: Sequence[ComparedBase], trial: TriedFaults) -> Comparison:
+    """All tried faults with their gains, the smallest error first, and the errors with no fault undone."""
     bare = trial.bare
     plain = fit_sizes(bare, None)
     faulty_samples = sum(compared.faulty.count for compared in compared_bases)
@@ -145,8 +149,8 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], trial: TriedFaults) ->
 
 
 def _balances(compared_bases: Sequence[ComparedBase], tried: Sequence[TriedVariant]) -> bool:
-    """Whether the force balance fits the faulty set, with nothing or with the best fault undone. tried: the best
-    first."""
+    """Whether the force balances fit the faulty set, either with no fault or with the best fault undone. tried: the
+    best first."""
     axes = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
     if all(
         compute_unexplained_share_of_rows(each.base, each.faulty.rows, each.faulty.masks) < BALANCE_HOLDS
@@ -160,7 +164,7 @@ def _balances(compared_bases: Sequence[ComparedBase], tried: Sequence[TriedVaria
 
 
 def _undo(compared: ComparedBase, found: TriedVariant) -> tuple[list[FloatArray], list[Mask]]:
-    """Rows of the faulty set with a fault undone at its fitted sizes, and masks of those with known values."""
+    """Rows of the faulty set with a fault undone at its fitted sizes, and masks of the rows with known values."""
     fit, fault, variant, _ = found
     changed = rows_with_fault_undone(compared, compared.faulty, fault, variant)
     rows, masks = list(compared.faulty.rows), list(compared.faulty.masks)
@@ -184,14 +188,14 @@ def _excesses_within_a_set(sides: Sequence[FloatArray]) -> Iterator[float]:
 
 
 def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, plain: Fit, samples: int) -> JudgedFault:
-    """The fault with its values and their standard errors, its gain, and its gains where it cannot be: between
-    stretches of one set. plain: the fit with nothing undone. samples: of both sets, over all bases."""
+    """The fault with its values and their standard errors, its gain, and the gains of the negative control. plain: the
+    fit with no fault undone. samples: number in both sets, over all bases."""
     fit, fault, variant, pairs = found
     values = variant.parameters_of(fit.sizes)
     folds = _leave_out_sixths(pairs)
     fits = [fit_sizes(kept, variant) for kept in folds]
     held_out = sum(held_out_error(kept, each.sizes, out) for out, kept, each in zip(SIXTHS, folds, fits, strict=True))
-    # The control takes long, and a fault without a gain needs none.
+    # The negative control takes long, and a fault with hardly any gain needs none.
     gains = (
         list(_gains_within_a_set(compared_bases, fault, restrict_sizes(variant), fit.sizes))
         if plain.error > (1 + LEAST_FAULT_GAIN) * fit.error
@@ -201,7 +205,7 @@ def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, pl
     errors = fit.errors * (1 + typical)
     drawn = bootstrap_draws(len(errors))
     drawn_gains = plain.errors[drawn].sum(axis=1) / np.maximum(errors[drawn].sum(axis=1), 1e-300) - 1
-    # Separate bases for both sets leave white errors of rms 1, whose sum of squares is the number of samples.
+    # With a separate base for each set, errors are white with rms 1: their sum of squares is the number of samples.
     error, excess = float(errors.sum()), plain.error - samples
     return JudgedFault(
         fault=fault,
@@ -221,8 +225,8 @@ def _judge_fault(compared_bases: Sequence[ComparedBase], found: TriedVariant, pl
 def _standard_errors(
     variant: Variant, without_faulty: Sequence[FloatArray], without_clean: Sequence[FloatArray]
 ) -> dict[str, float]:
-    """Standard error of each value of a fault, from its sizes with each sixth of either set left out: variances of both
-    sets and of the spacing of the variants add up."""
+    """Standard error of each value of a fault: root of the sum of the jackknife variances of both sets, from the sizes
+    with each sixth left out, and of the squared error due to the spacing of the variants."""
     sets = [[variant.parameters_of(sizes) for sizes in each] for each in (without_faulty, without_clean)]
     return {
         name: float(
@@ -255,10 +259,10 @@ def _leave_out_sixths(pairs: Sequence[Pair]) -> list[list[Pair]]:
 def _gains_within_a_set(
     compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant, sizes: FloatArray
 ) -> Iterator[float]:
-    """The fault's gains between stretches of one set (negative control): in the clean set from size zero to the
-    stretch's own size; in the faulty set from the size found there, which is undone everywhere first, because lack of
-    fit of the base would gain in any stretch. A fault that varies differs between stretches of the faulty set itself,
-    which is no control then."""
+    """The fault's gains between stretches of one set (negative control). Clean set: error with nothing undone over
+    error with the stretch's own size undone, less 1. Faulty set: the same, with the size found there undone everywhere
+    first, because a base that does not fit the faulty rows would give a gain in any stretch. A fault that varies with
+    time also differs between stretches of the faulty set, which is then no control."""
     for is_clean in (True,) if fault.varies else (True, False):
         common = np.zeros_like(sizes) if is_clean else sizes
         sides = [compared.clean if is_clean else compared.faulty for compared in compared_bases]

@@ -1,4 +1,9 @@
-"""Decides what is named after a comparison with clean recordings: a fault, a class of faults, or candidates only."""
+"""Decides what is named after a comparison with clean recordings: a fault, a class of faults, or candidates only.
+
+The fault with the smallest error is named if its gain passes the tests of `_why_not`. Rivals whose error is not
+significantly larger (bootstrap over blocks) form its class; a class of too many faults, or an unnamed candidate with a
+smaller error, prevents a name. Errors and gains are those of `compare`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,16 +28,19 @@ from analysis.diagnosis.settings import (
 )
 
 BOUND = float(stdtrit(FOLDS - 1, 0.975))
-"""Half-width of a 95 % interval in standard errors (Student's t for few blocks): a parameter within it may be zero."""
+"""Half-width of a 95 % confidence interval in standard errors: quantile of Student's t with FOLDS - 1 degrees of
+freedom. A parameter within it of its value without a fault may have that value."""
 SAME = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),
     "force_offset": ("constant_force",),
 }  # fmt: skip
-"""Faults that cannot be distinguished in any recording of one command and one response."""
+"""Faults with the same effect on the signals: the two delays in a recording of one response, and an offset of the
+command and a constant force in any recording."""
 
 FINER = "it holds the named fault as a special case, and is not sure to leave less"
 BEHIND = "another explains more of what sets these recordings apart"
+"""Reasons, in messages, why a rival of the named fault is not named."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,9 +51,9 @@ class Decision:
     alike: tuple[str, ...]
     """Effects that fit as well in its place (class)."""
     probability: float
-    """Share of bootstrap draws in which none of them has a smaller error."""
+    """Share of bootstrap draws in which no significant rival has a smaller error; refinements do not count."""
     others: tuple[tuple[JudgedFault, str], ...]
-    """Candidates with the reason why they are not named; the best first."""
+    """Candidates that are not named, each with the reason in words."""
 
 
 def decide(found: Comparison, responses: int) -> Decision:
@@ -89,8 +97,8 @@ def decide(found: Comparison, responses: int) -> Decision:
 
 
 def _unsure_but_as_good(unsure: Sequence[JudgedFault], best: JudgedFault, found: Comparison) -> list[JudgedFault]:
-    """Faults that are not significant by themselves but have as small an error as the best, which is: either may be the
-    cause."""
+    """Candidates that fail a test of `_why_not` although their gain has a lower bound above 0, and whose error differs
+    too little from that of the best, which passes all tests: either may be the cause."""
     return [
         law
         for law in unsure
@@ -115,8 +123,9 @@ def _choose_plainest(sure: Sequence[JudgedFault], found: Comparison) -> JudgedFa
 
 
 def _why_not(weighed: JudgedFault, differ: bool) -> str:
-    """differ: whether the sets differ by more than stretches of one. If not, a fault must gain in all blocks alike,
-    which excludes slow changes during a recording."""
+    """Reason not to name a fault; empty if it passes all tests. differ: whether the clean and the faulty set differ by
+    more than stretches of a single set do. If not, the fault must gain about equally in all blocks, which excludes slow
+    changes during a recording."""
     if weighed.gain < LEAST_FAULT_GAIN or weighed.gain_low <= 0:
         return "its gain is not larger than what varies between stretches"
     steady = weighed.gain_low >= FAULT_STEADY * weighed.gain and not weighed.fault.varies
@@ -136,6 +145,8 @@ def _distance_from_none(weighed: JudgedFault, name: str) -> float:
 
 
 def _is_inseparable(best: JudgedFault, other: JudgedFault, found: Comparison) -> bool:
+    """Whether the error of `other` exceeds that of the best too little to distinguish them, or not significantly
+    (bootstrap over blocks)."""
     behind = other.errors - best.errors
     drawn = bootstrap_draws(len(behind))
     return bool(
@@ -152,17 +163,19 @@ def _is_sure_to_leave_less(finer: JudgedFault, best: JudgedFault) -> bool:
 
 
 def _excess_error(other: JudgedFault, best: JudgedFault) -> float:
-    """Error of another fault minus that of the best."""
+    """Sum of squares of another fault minus that of the best."""
     return float((other.errors - best.errors).sum())
 
 
 def _least_distinguished(best: JudgedFault, found: Comparison) -> float:
-    """Least difference of a rival's error from that of the best, for it to be distinguished."""
+    """Least difference between a rival's error and that of the best, as sums of squares, at which both are
+    distinguished: a share of the reduction by the best, or of its remaining error, the smaller of both."""
     left = float(best.errors.sum())
     return min(FAULT_RIVAL_BEHIND * (float(found.plain.sum()) - left), FAULT_RIVAL_WORSE * left)
 
 
 def _probability_of_best(best: JudgedFault, rivals: Sequence[JudgedFault]) -> float:
+    """Share of bootstrap draws over blocks in which no rival has a smaller error than the best."""
     drawn = bootstrap_draws(len(best.errors))
     first = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for other in rivals:

@@ -1,5 +1,9 @@
-"""Base model by force balance: along each axis mass, damping, stiffness and the laws that the clean recordings need.
-None of these laws is named; they describe the device without faults."""
+"""Force balance as the base model of a comparison with reference recordings: the device without the fault.
+
+Per driven axis, F = M a + D v + K q + c + sum of w phi(q, v): linear regression of the force on the motion of all
+measured channels, a constant, and nonlinear laws phi that lower the cross-validated error (`balance.regression`). The
+laws only make the base accurate; none of them is named.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,19 +22,22 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceBase:
-    """One axis. Rows are the force, then the columns that predict it."""
+    """Base model of one driven axis: makes rows of the force and of the columns (regressors) that predict it."""
 
     axis: int
     laws: tuple[Law, ...]
     band_hz: float
+    """Upper end of the band (Hz) to which force and columns are filtered."""
     turns: bool
+    """Whether a shaft rotates freely, so that the balance has no stiffness (see `Scales`)."""
     rate_hz: float
-    """Sample rate of the rows."""
+    """Sample rate of the rows (Hz), after decimation."""
     lowest_hz: float = 0.0
-    """Lower end of the band, see `Motion`."""
+    """Lower end of the band (Hz), see `Motion`."""
 
     def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
-        """Per part (kept, 1 + columns). like: rows of parts with the same motion, whose columns are reused."""
+        """Per part, (kept samples, 1 + columns): the force first. like: rows of parts with the same motion, whose
+        columns are reused, so that only the force is filtered again."""
         if like is not None:
             commands = (
                 band_pass(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz) for part in parts
@@ -47,7 +54,7 @@ class ForceBase:
         return tuple(found)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
-        """Per part, mask of its rows: known samples more than a filter length from the part's ends."""
+        """Per part, mask of its rows (kept samples,): known samples more than a filter length from the part's ends."""
         return tuple(
             motion.valid_samples(part.known)
             for motion, part in zip(
@@ -57,7 +64,8 @@ class ForceBase:
 
 
 def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceBase:
-    """The base of one axis with its laws selected. motions: of the clean recordings, all samples fitted to."""
+    """Base model of one axis, with laws selected: first of the general laws, then with cogging at the pitches that the
+    residual force shows. motions: of the compared recordings; all known samples are fitted to."""
     scales = [scales_of(motions, channel, rotational) for channel in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
     regression = regression_of(motions, axis, list(laws_of(motions, rotational)), turns)
@@ -80,7 +88,8 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
 
 
 def _select_laws(regression: Regression) -> tuple[int, ...]:
-    """Forward selection of laws, as long as the cross-validated error falls by `BASE_LAW_GAIN`."""
+    """Indices of the laws by forward selection: adds the best law while it lowers the cross-validated squared error by
+    at least the share `BASE_LAW_GAIN`, up to `MOST_BASE_LAWS` laws."""
     laws: tuple[int, ...] = ()
     error = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
     while len(laws) < MOST_BASE_LAWS:

@@ -1,6 +1,7 @@
-"""Base model of one sensor by another: a measured velocity or acceleration from the differentiated position.
+"""Base model that predicts one sensor from another: a velocity or acceleration from the differentiated position.
 
-No physics of the device is involved, so that a difference is a fault of one of the sensors.
+The prediction is a linear regression on the differentiated position at neighbouring times (a short FIR filter) and a
+constant. No physics of the device is involved, so that a difference between recordings is a fault of a sensor.
 """
 
 from collections.abc import Sequence
@@ -21,18 +22,21 @@ class SensorBase:
     """A channel of the response predicted from the same channel of the position, differentiated and filtered."""
 
     channel: int
+    """Index of the channel in the response and in the position."""
     times: int
-    """Derivatives between the two."""
+    """Number of differentiations from the position channel's quantity to that of the response."""
     band_hz: float
+    """Upper end of the band to which both signals are filtered, Hz."""
     step: int
+    """Decimation after filtering: one of this many samples is kept."""
 
     def rows(self, parts: Sequence[Part], like: tuple[FloatArray, ...] | None = None) -> tuple[FloatArray, ...]:
-        """Per part (kept, 1 + columns): a filtered reading; then the differentiated position at the same time and up to
-        `SENSOR_TAPS` rows before and after, and 1. `like` is not used."""
+        """Per part (kept, 1 + columns): the filtered reading; its regressors, which are the differentiated position
+        from `SENSOR_TAPS` rows before to as many after, and 1. like: not used."""
         return tuple(self._rows(part) for part in parts)
 
     def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
-        """Per part, mask of its rows: known samples more than a period of `band_hz` from the part's ends."""
+        """Per part, mask of its rows: known samples that are more than one period of `band_hz` from the part's ends."""
         found = []
         for part in parts:
             edge = int(part.rate_hz / self.band_hz) + 1
@@ -52,7 +56,8 @@ class SensorBase:
 
 
 def sensor_bases(parts: Sequence[Part], band_hz: float, step: int) -> tuple[SensorBase, ...]:
-    """One base per response whose position is measured, too."""
+    """One base per response channel whose quantity is a derivative of the measured position channel. None without a
+    position, without a time axis (infinite band), or where the numbers of channels differ."""
     recording = parts[0].recording
     if recording.position is None or parts[0].position is None or not np.isfinite(band_hz):
         return ()

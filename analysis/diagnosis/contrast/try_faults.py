@@ -1,9 +1,10 @@
-"""Finds for each fault the variant and the size with the smallest error after undoing it.
+"""Fit the size of every fault: for each fault, the variant and the size with the smallest error after undoing it.
 
-A fault of unknown size s changes the recording by s times a known column where it is small, and otherwise only near the
-size about which it was linearised. Each variant (axis, sign, corner frequency) is undone by least squares over its
-sizes, jointly with the parameters of the intact device; the best are linearised again about the size that was found, a
-Gauss-Newton iteration whose step is judged by the error.
+A fault is a change of the device or its sensors between two sets of recordings. A variant of it has fixed nonlinear
+parameters (such as a corner frequency) and an unknown size s. Undoing it changes the recording by s times a known
+column: exactly where the fault is linear in s, and to first order otherwise. The size is found by least squares,
+jointly with the parameters of the intact device (`joint_products`). Where undoing is not linear, the fault is
+linearised again about the size that was found: a Gauss-Newton iteration, which keeps the size with the smallest error.
 """
 
 from collections.abc import Sequence
@@ -19,35 +20,36 @@ from analysis.diagnosis.types import TimeBudget
 ALL = tuple(range(CONTRAST_BLOCKS))
 """Numbers of all blocks into which the samples are divided for cross-validation."""
 VARIANTS_APPROACHED = 3
-"""Number of variants of a fault that are linearised again about their best sizes; each takes as long as a first try. By
-hand."""
+"""Of a fault that is valid at size 1 only: number of its variants that are linearised again, besides the best of all
+sizes. Chosen by hand; each takes as long as a first try."""
 
 
 class TriedVariant(NamedTuple):
     """A variant of a fault, undone at its best size."""
 
     fit: Fit
-    """Sizes, and the error that is left."""
+    """Fitted sizes, and the sums of squared errors with the fault undone."""
     fault: Fault
     variant: Variant
     pairs: list[Pair]
-    """Per base, the least-squares products of both sets with the fault undone."""
+    """Per base (force, sensor or autoregressive model): least-squares products of both sets, with the fault undone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TriedFaults:
-    """Result of trying faults: each with its best variant and size, beside the products with nothing undone."""
+    """Result of trying faults: each with its best variant and size, and the products without any fault undone."""
 
     bare: list[Pair]
     """Per base, the products of both sets with nothing undone."""
     tried: list[TriedVariant]
-    """Each fault by its best variant; the one that leaves least first."""
+    """The best variant of each fault that could be undone, in order of rising error."""
     complete: bool
     """Whether all faults were tried before the time ran out."""
 
 
 def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], time_left: TimeBudget) -> TriedFaults:
-    """Tries the faults in order, each on all bases together, until the time runs out."""
+    """Try the faults in order, each on all bases together, until the time runs out. Faults of which no variant is
+    well-conditioned are left out."""
     clean = [compared.grams(compared.clean, []).blocks for compared in compared_bases]
     bare = [
         Pair(compared.grams(compared.faulty, []), ALL, tuple(own), (compared.clean.scale / compared.faulty.scale) ** 2)
@@ -69,8 +71,8 @@ def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], 
 def _try_variant(
     bare: Sequence[Pair], compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant
 ) -> TriedVariant | None:
-    """Undo the fault by this variant and measure what error remains; None where undoing it is ill-conditioned. bare:
-    the pairs with nothing undone."""
+    """Undo the fault by this variant and fit its sizes; None where undoing it is ill-conditioned. bare: per base, the
+    products without any fault undone."""
     pairs = [
         replace(
             pair,
@@ -83,14 +85,15 @@ def _try_variant(
 
 
 def _error_of(tried: TriedVariant) -> float:
+    """Sum of squared errors with the fault undone; a sort key."""
     return tried.fit.error
 
 
 def _best_of(
     tried: Sequence[TriedVariant], bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]
 ) -> TriedVariant:
-    """The variant with the smallest error, after linearisation about its size. Of faults that are valid at size 1 only,
-    several are kept, because at another size any of them may have a smaller error than the true one."""
+    """The variant with the smallest error, after linearisation about its size. Of a fault that is valid at size 1 only
+    (`Variant.exact`), several are compared at size 1: at another size, a wrong variant may have the smallest error."""
     first = min(tried, key=_error_of)
     if not first.variant.exact:
         return _approach(first, bare, compared_bases)
@@ -99,7 +102,8 @@ def _best_of(
 
 
 def _approach(found: TriedVariant, bare: Sequence[Pair], compared_bases: Sequence[ComparedBase]) -> TriedVariant:
-    """The fault linearised repeatedly about the size that was found: far from it, the change is only extrapolated."""
+    """The best fit of at most `UNDOING_ROUNDS` Gauss-Newton iterations. Each linearises the fault about the size that
+    the last iteration found, until that size changes by a share of less than `SIZE_IS_NEAR`."""
     best = _fit_allowed_size(found)
     for _ in range(UNDOING_ROUNDS):
         fit, fault, variant, _ = found
@@ -116,7 +120,7 @@ def _approach(found: TriedVariant, bare: Sequence[Pair], compared_bases: Sequenc
 
 
 def _fit_allowed_size(found: TriedVariant) -> TriedVariant:
-    """The variant at the best of its allowed sizes."""
+    """The variant as fitted; with its size fixed at 1 where it is valid at size 1 only."""
     _, fault, variant, pairs = found
     if not variant.exact:
         return found
@@ -124,5 +128,5 @@ def _fit_allowed_size(found: TriedVariant) -> TriedVariant:
 
 
 def restrict_sizes(variant: Variant) -> Variant:
-    """The variant, with its size fixed at 1 where it is a fault at size 1 only."""
+    """The variant, with its size fixed at 1 where it is valid at size 1 only (`Variant.exact`)."""
     return fix_size(variant, 0.0) if variant.exact else variant

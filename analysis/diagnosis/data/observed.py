@@ -1,4 +1,8 @@
-"""A recording ready for comparison: its signals, and which samples serve to fit, to choose and to test by."""
+"""A recording ready for comparison with a model: its signals, and the split of its samples (`roles`) into three sets.
+
+The sets are those of statistical learning: training (`fit`: parameters are fitted to it), validation (`choose`: among
+explanations the best is chosen by it) and test (`test`: held out until the end, for an unbiased error).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,13 +25,14 @@ from equalizer.signals.signal import FloatArray, runs_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observed:
-    """One recording. Channels are the response's, then the position's."""
+    """One recording with its signals in SI units and the three sets of samples. A sample may belong to none, such as
+    one with a missing reading."""
 
     recording: Recording
     command: FloatArray
-    """(n, m)"""
+    """(n, m): command of each input."""
     measured: FloatArray
-    """(n, c)"""
+    """(n, c): channels of the response, then of the position, as measured; NaN = missing."""
     fit: Mask
     """(n,): samples that parameters are fitted to."""
     choose: Mask
@@ -36,8 +41,8 @@ class Observed:
     """(n,): held-out samples, used only in the end."""
 
     def unseal(self, opened: Mask) -> "Observed":
-        """Copy in which the held-out samples of `opened` are used too: two thirds of each stretch to fit, the last
-        third to choose by."""
+        """Copy in which the held-out samples within the mask `opened` (n,) are no longer held out: of each stretch, two
+        thirds become fit samples, the last third validation samples."""
         opened = opened & self.test
         fit, choose = self.fit.copy(), self.choose.copy()
         for start, stop in runs_of(opened):
@@ -47,18 +52,19 @@ class Observed:
         return replace(self, fit=fit, choose=choose, test=self.test & ~opened)
 
     def longest_held_out(self) -> int:
-        """Samples of the longest held-out stretch; 0 where nothing is held out."""
+        """Number of samples of the longest held-out stretch; 0 where nothing is held out."""
         return max((stop - start for start, stop in runs_of(self.test)), default=0)
 
     def every_other_part(self, parts: int) -> Mask:
-        """(n,): the first, third … of so many equal parts of each held-out stretch."""
+        """(n,): mask of the first, third, fifth … part of each held-out stretch, which is divided into `parts` equal
+        parts."""
         found = np.zeros(len(self.test), dtype=np.bool_)
         for start, stop in runs_of(self.test):
             found[start:stop] = (np.arange(stop - start) * parts // (stop - start)) % 2 == 0
         return found
 
     def held_out_levels(self) -> list[tuple[Segment, float]]:
-        """Each segment of which something is held out, with its largest command."""
+        """Each segment with held-out samples, and the largest magnitude of its commands."""
         parts = [(segment, slice(segment.start, segment.stop)) for segment in self.recording.segments]
         return [
             (segment, float(np.abs(self.command[part]).max(initial=0.0)))
@@ -67,18 +73,19 @@ class Observed:
         ]
 
     def held_out_below(self, level: float) -> Mask:
-        """(n,): held-out samples of segments whose commands stay below a level."""
+        """(n,): mask of the held-out samples in segments whose commands stay below `level`."""
         found = np.zeros(len(self.test), dtype=np.bool_)
         for segment, largest in self.held_out_levels():
             found[segment.start : segment.stop] = largest < level
         return found & self.test
 
     def fit_to_all(self) -> "Observed":
-        """The record with the validation samples added to the fit samples, for explanations chosen by other means."""
+        """The record with fit and validation samples joined, and used for both: for explanations that are chosen by
+        other means than validation."""
         return replace(self, fit=self.fit | self.choose, choose=self.fit | self.choose)
 
     def shorten(self) -> "Observed":
-        """The record without the samples after the last one to fit or to choose by; its recording is not cut."""
+        """The record cut after its last fit or validation sample, without a test set; `recording` itself is not cut."""
         end = int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)
         no_test = np.zeros(end, dtype=np.bool_)
         return Observed(
@@ -87,15 +94,16 @@ class Observed:
 
 
 def observe(recording: Recording, responses: int) -> Observed:
-    """A recording with its samples' roles. responses: number of the model's outputs; a position with another number of
-    channels is left out."""
+    """A recording as one part, with its samples divided by `roles`. responses: number of the model's outputs; a
+    position with another number of channels is left out."""
     measured, known = stack_measured_signals(recording, responses)
     fit, choose, test = (mask & known for mask in roles(recording.segments, len(recording)))
     return Observed(recording, recording.command.samples, measured, fit, choose, test)
 
 
 def stack_measured_signals(recording: Recording, responses: int) -> tuple[FloatArray, Mask]:
-    """Response and, where it has as many channels, position (n, c), and the mask of samples where all are known."""
+    """Response and position side by side, (n, c), and the mask (n,) of samples where all are finite. A position whose
+    number of channels is not `responses` is left out."""
     signals = [recording.response.samples]
     if recording.position is not None and recording.position.samples.shape[1] == responses:
         signals.append(recording.position.samples)
@@ -106,7 +114,8 @@ def stack_measured_signals(recording: Recording, responses: int) -> tuple[FloatA
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A part of a recording: its first sample, the end of its motion, and its end (both exclusive)."""
+    """A part of a recording as sample indices: first sample, end of its motion, end of the part (both ends
+    exclusive)."""
 
     start: int
     end_of_motion: int
@@ -114,12 +123,14 @@ class Span:
 
 
 def find_moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) -> tuple[Span, ...]:
-    """Parts with the end of their motion: the last sample at which any channel differs from its rest at the part's end
-    by more than `AT_REST` of its range. response: (n, p)."""
+    """Parts with the end of their motion: the last sample at which any channel differs from its rest value at the
+    part's end by more than `AT_REST` of its range. response: (n, p); parts: start and end (exclusive)."""
     return tuple(Span(start, start + _end_of_motion(response[start:stop]), stop) for start, stop in parts)
 
 
 def _end_of_motion(samples: FloatArray) -> int:
+    """Number of samples until the end of motion, at least half of them; all where the part does not come to rest before
+    its last `LONGEST_TAIL`. The rest value is the median over that tail."""
     samples = samples[:, np.isfinite(samples).any(axis=0)]
     last = int((1 - LONGEST_TAIL) * len(samples))
     known: Mask = np.asarray(np.isfinite(samples).all(axis=1), dtype=np.bool_)
@@ -136,13 +147,14 @@ def _end_of_motion(samples: FloatArray) -> int:
 def roles(
     segments: tuple[Segment, ...], length: int, tested: bool = False, spans: Sequence[Span] = ()
 ) -> tuple[Mask, Mask, Mask]:
-    """Masks (length,) of the samples to fit, to choose and to test by. tested: another recording is held out for the
+    """Masks (length,) of the fit, validation and test samples. tested: whether another recording is held out for the
     test. spans: the recording's parts; empty = one part.
 
-    Segments marked as test are held out. Without such marks, the end of each segment is held out, in whole periods, so
-    that every level is tested; of a single level, the end of the time. Of the rest, the middle one of three or more
-    levels is kept to choose by: laws differ in how they grow with the level, whereas further periods of a fitted level
-    only show noise. Otherwise the last quarter of the time is kept.
+    Segments marked as test are held out. Without such marks, the last quarter of each segment is held out, in whole
+    periods, so that every level is tested; where all segments have the same level, the last quarter of the time. Of the
+    other segments, those of the middle level are the validation set where there are three or more levels: laws differ
+    in how they grow with the level, whereas further periods of a fitted level differ by noise only. Otherwise the last
+    quarter of the remaining time is the validation set.
 
     Without segments, the last quarter of each part's motion is held out; the rest period after it, which may show a
     force but no motion, is fitted.
@@ -166,6 +178,8 @@ def roles(
 
 
 def _roles_without_segments(spans: Sequence[Span], length: int, tested: bool) -> tuple[Mask, Mask, Mask]:
+    """Masks (length,) of the fit, validation and test samples, by shares of each part's motion. tested: nothing is held
+    out."""
     fit, choose, test = (np.zeros(length, dtype=np.bool_) for _ in range(3))
     for span in spans:
         held_out = span.stop if tested else span.start + int((1 - TEST_SHARE) * (span.end_of_motion - span.start))
@@ -176,13 +190,14 @@ def _roles_without_segments(spans: Sequence[Span], length: int, tested: bool) ->
 
 
 def error_units(measured: FloatArray, noise: FloatArray) -> FloatArray:
-    """(c,): unit of each channel's errors: its noise and, added in quadrature, the share of its rms that no model
-    reaches."""
+    """(c,): unit by which each channel's errors are divided: sqrt(noise^2 + (MODEL_FLOOR rms)^2), with the rms of the
+    noise, and the share of the signal's rms that no model predicts. measured: (n, c); noise: (c,)."""
     rms = np.sqrt(np.nanmean(measured**2, axis=0))
     return np.asarray(np.sqrt(noise**2 + (MODEL_FLOOR * rms) ** 2))
 
 
 def _segment_mask(segments: list[Segment], length: int) -> Mask:
+    """(length,): mask of the samples in these segments."""
     mask = np.zeros(length, dtype=np.bool_)
     for segment in segments:
         mask[segment.start : segment.stop] = True
@@ -190,7 +205,8 @@ def _segment_mask(segments: list[Segment], length: int) -> Mask:
 
 
 def _segment_ends(segments: list[Segment], length: int) -> Mask:
-    """The last quarter of each segment, or of the time where there is one level or none."""
+    """(length,): mask of the last quarter of each segment, rounded to whole periods but at least one period; of the
+    last quarter of the time where there is one level or none."""
     mask = np.zeros(length, dtype=np.bool_)
     if len(_levels(segments)) < LEVELS_TO_STRATIFY:
         places = np.flatnonzero(_segment_mask(segments, length)) if segments else np.arange(length)
@@ -206,10 +222,12 @@ def _segment_ends(segments: list[Segment], length: int) -> Mask:
 
 
 def _levels(segments: list[Segment]) -> list[float]:
+    """The different amplitudes above 0, ascending."""
     return sorted({segment.amplitude for segment in segments if segment.amplitude > 0})
 
 
 def _middle_level(segments: list[Segment], length: int) -> Mask:
+    """(length,): mask of the segments of the middle level; empty with fewer than `LEVELS_TO_HOLD_ONE_BACK` levels."""
     levels = _levels(segments)
     if len(levels) < LEVELS_TO_HOLD_ONE_BACK:
         return np.zeros(length, dtype=np.bool_)

@@ -1,4 +1,9 @@
-"""Adds a discovered law to a finished search where no catalogue effect is named, or where the law is far better."""
+"""Adds discovered laws (formulas outside the catalogue of effects) to the result of a search for catalogue effects.
+
+Laws are searched where the catalogue leaves a mismatch, or where its named effects may only approximate a law. They
+replace the named effects if they pass the checks of `validation` on held-out data; otherwise they are reported as
+unconfirmed candidates, with the reasons. The search itself is `discover`; its equations are in the package's docstring.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,17 +35,18 @@ from equalizer.laws.law import Law
 
 @dataclass(slots=True)
 class LawSearch:
-    """The search for laws, beyond the catalogue. Laws are looked for beside the re-tuned model, without the catalogue's
-    effects: a search that ended by itself is not repeated on the same samples."""
+    """The search for laws outside the catalogue. Laws are added to the re-tuned model without the catalogue's effects,
+    so that a completed search need not be repeated on the same samples after further effects were found."""
 
     progress: Progress
     time_left: TimeBudget
     _done: list[tuple[FittedCandidate, int, Discovery | None]] = field(default_factory=list)
-    """Per search: the re-tuned model, the most laws, and what was found."""
+    """Per completed search: the re-tuned model, the largest number of laws, and the discovery, None where there was
+    none."""
 
     def add_short(self, result: SearchResult) -> SearchResult:
-        """Add laws as `add_any`, but only where they are likely to explain all of the mismatch with a shorter
-        description than two effects of the catalogue: see `is_short`."""
+        """Add laws as `add_any`, but only those that are a shorter description than two effects of the catalogue
+        (`is_short`)."""
         if not _needs_law(result) or not self.time_left():
             return result
         found = discover(result.context, result.found, self.progress, self.time_left, LAW_MOST_ROUNDS, alone=True)
@@ -49,12 +55,12 @@ class LawSearch:
         return weigh_laws(result, found, self.time_left) if found is not None and is_short(found) else result
 
     def add_any(self, result: SearchResult) -> SearchResult:
-        """The search with discovered laws in place of its names. Unchanged where it needs no law or none is better;
-        laws that fail a check of `validation` are added as unconfirmed candidates only."""
+        """The result with discovered laws in place of its named effects. Unchanged where it needs no law or no law is
+        better; with laws that fail a check of `validation` as unconfirmed candidates only."""
         if not _needs_law(result) or not self.time_left():
             return result
         fits = result.judgement.named and result.found.after.score.worst_channel <= NOISE_ALONE
-        # Beside names that fit, only a single law is the shorter description.
+        # Where the named effects fit down to the noise, only a single law is a shorter description.
         most = 1 if fits else LAW_MOST_ROUNDS
         known = [found for model, laws, found in self._done if model is result.found.retuned and laws == most]
         if not known:
@@ -64,8 +70,8 @@ class LawSearch:
 
 
 def is_short(of: Discovery) -> bool:
-    """Whether laws are a shorter description than two effects: a single term, or a term on each of several axes, each
-    of which depends on another axis."""
+    """Whether laws are a shorter description than two effects: a single term in all, or a single term per axis or
+    response channel, where each term depends on the motion of another axis."""
     sums = [each for found in of.rounds for each in (found.sums[0], found.sums[0].partner) if each is not None]
     places = {(each.acts_on, each.axis) for each in sums}
     if any(len(each.terms) > 1 for each in sums) or len(places) < len(sums):
@@ -74,7 +80,8 @@ def is_short(of: Discovery) -> bool:
 
 
 def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) -> SearchResult:
-    """The search with laws that pass all checks in place of its names, or with laws as candidates."""
+    """The result with the laws in place of its named effects where they pass all checks, else with the laws as
+    unconfirmed candidates; unchanged where the laws do not lower the held-out error."""
     context, known = result.context, result.found
     if time_left():
         found = choose_on_held_out(context, found)
@@ -84,7 +91,7 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
     is_open = len(checked.steps) < len(found.found.steps)
     fewer = _keep_rounds_of(found, checked) if is_open and _improves_held_out(checked) else None
     if fewer is not None:
-        # A law too weak for these recordings to fix its parameters takes no other law's name away.
+        # Only identifiable laws remain. A law that is not identifiable must not prevent these from being named.
         found, is_open = fewer, False
     rivals, judged = _rivals(context, known), judge(checked)
     reasons = (*_reasons_of_rivals(context, known, found, rivals), *_reasons_of_fit(found, checked))
@@ -101,7 +108,8 @@ def weigh_laws(result: SearchResult, found: Discovery, time_left: TimeBudget) ->
 def _reasons_of_rivals(
     context: SearchContext, known: Explanation, found: Discovery, rivals: Sequence[FittedCandidate]
 ) -> Iterator[str]:
-    """Why the laws do not take the place of what the catalogue offers, and fail the checks of `validation`."""
+    """Reasons, as sentences, why the laws do not replace the explanations of the catalogue: failed checks of
+    `validation`, and rivals whose error is hardly larger."""
     if known.steps and may_stand_for_a_law(context, known):
         rivals = [rival for rival in rivals if not does_as_well_with_less(context, found, rival)]
     yield from reasons_against(context, found, rivals)
@@ -110,6 +118,7 @@ def _reasons_of_rivals(
 
 
 def _reasons_of_fit(found: Discovery, checked: Explanation) -> Iterator[str]:
+    """Reasons, as sentences, from the fit itself: it ended early, or its held-out error is too large."""
     if not all(each.complete for each in found.rounds):
         yield "the time ended before other laws were fitted"
     held_out = float(np.nanmax(checked.after.score.test, initial=0.0))
@@ -118,8 +127,8 @@ def _reasons_of_fit(found: Discovery, checked: Explanation) -> Iterator[str]:
 
 
 def _needs_law(result: SearchResult) -> bool:
-    """Whether a law may be searched for: only whole simulations can confirm one, and where noise alone remains, there
-    is none to be found, unless the names may stand for it."""
+    """Whether laws are to be searched: only a free simulation can confirm a law, and an error at the noise level leaves
+    none to find, unless the named effects may approximate a law (`may_stand_for_a_law`)."""
     context, found = result.context, result.found
     if (
         context.measure.name != "free simulation"
@@ -134,8 +143,8 @@ def _needs_law(result: SearchResult) -> bool:
 
 
 def may_stand_for_a_law(context: SearchContext, named: Explanation) -> bool:
-    """Whether names that fit may only approximate a law that the catalogue lacks: several forces on the same axis, or a
-    periodic force of which fewer than two periods were visited."""
+    """Whether named effects that fit may only approximate a law that the catalogue lacks: several forces on the same
+    axes, or an effect whose parameters exceed the recorded range (a periodic force needs `PITCHES_SEEN` periods)."""
     fitted, claims = named.after.fitted, named.after.fitted.hypothesis.claims
     forces = all(isinstance(claim.effect.acts, AxisForce) for claim in claims)
     if len(claims) > 1 and forces and len({claim.sites for claim in claims}) == 1:
@@ -146,17 +155,18 @@ def may_stand_for_a_law(context: SearchContext, named: Explanation) -> bool:
 
 
 def _improves_held_out(found: Explanation) -> bool:
-    """Whether the held-out error falls, in the mean of its logarithm over the channels."""
+    """Whether the held-out error is below that of the re-tuned model; also true where the latter is not known."""
     before, after = _held_out_log_error(found.retuned), _held_out_log_error(found.after)
     return not (np.isfinite(before) and after >= before)
 
 
 def _held_out_log_error(of: FittedCandidate) -> float:
+    """Mean over the channels of the log held-out rms error, in units of the noise."""
     return float(np.mean(np.log(of.score.test)))
 
 
 def _rivals(context: SearchContext, known: Explanation) -> list[FittedCandidate]:
-    """Rivals of a law from the catalogue: the explanation that is named, and the best candidate of the first round."""
+    """Rivals of the laws from the catalogue: the explanation with its named effects, and the best single effect."""
     rivals = [known.after] if known.steps else []
     if known.rounds and known.rounds[0]:
         rivals.append(context.with_test_score(known.rounds[0][0]))
@@ -173,9 +183,9 @@ def _candidates(context: SearchContext, found: Discovery, reasons: tuple[str, ..
 
 
 def _keep_rounds_of(of: Discovery, fewer: Explanation) -> Discovery | None:
-    """The discovery restricted to an explanation `fewer` with some of its laws, in their order, and the first rounds
-    that found these. None where it holds no law, or one whose round is not known: the checks of a law are those of its
-    round."""
+    """The discovery restricted to the explanation `fewer`, which has some of its laws in the same order, and to the
+    rounds that found these. None where `fewer` has no law, or a law that belongs to no round: the checks of a law need
+    the data of its round."""
     if not fewer.steps:
         return None
     kept = [_structure(law) for law in laws_of(fewer.after.fitted.hypothesis)[-len(fewer.steps) :]]
@@ -191,4 +201,5 @@ def _keep_rounds_of(of: Discovery, fewer: Explanation) -> Discovery | None:
 
 
 def _structure(law: Law | None) -> tuple[str, str, str] | None:
+    """Identity of a law without its parameters: formula, what it acts on, and axis."""
     return None if law is None else (law.expression, law.acts_on, law.axis)

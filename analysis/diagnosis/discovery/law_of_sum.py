@@ -1,4 +1,9 @@
-"""Turns a sum of terms into a law that can be simulated, and a hypothesis into its laws."""
+"""Conversion of a fitted sum of terms into a law that can be simulated, and of a hypothesis into its laws.
+
+The search for unknown physics fits a sum  factor_1 term_1 + factor_2 term_2 + … (`fit_sum`) with signals named x, y, z
+by their order. A simulation needs a formula in the language of laws (`equalizer.laws`), with parameters p0, p1, … and
+the recording's own names for the signals.
+"""
 
 import re
 from collections.abc import Sequence
@@ -13,13 +18,15 @@ from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 
 _NUMBER = re.compile(r"\bp(\d+)\b")
+"""A free parameter, such as p0, in the formula of a term."""
 _SIGNAL = re.compile(rf"\b([vfa]?)([{AXES}])\b")
+"""A signal in the grammar's names: position x, velocity vx, command fx, reading ax."""
 
 
 def law_of_sum(of: Sum, recording: Recording) -> Law:
-    """The sum as a law: p0 is the first term's factor, then its parameters, then the next term's. The grammar calls the
-    driven axes and the channels of the response x, y, z in their order; the law calls them as the recording does. What
-    depends on commands alone and remembers nothing is a law of the command: then it can be undone."""
+    """The sum as a law with parameters in SI units: p0 is the first term's factor, followed by that term's own
+    parameters, then the next term's. Signals get the recording's names. A force that depends on commands alone and has
+    no memory becomes a law of the command, f + sum, because such a law can be inverted."""
     channels = law_channels(recording)
     names, readings = axis_names(channels.inputs), names_of_readings(channels)
     parts: list[str] = []
@@ -44,17 +51,18 @@ def law_of_sum(of: Sum, recording: Recording) -> Law:
 
 
 def _renumber(shape: str, first: int) -> str:
+    """Formula of a term with its parameters p0, p1, … renumbered from `first` on."""
     return _NUMBER.sub(lambda found: f"p{int(found[1]) + first}", shape)
 
 
 def hypothesis_of_sum(of: Sum, recording: Recording) -> Hypothesis:
-    """The sum as a hypothesis to simulate; a partner on another axis adds a claim of its own."""
+    """The sum as a hypothesis to simulate: one claim, and one more for its partner on another axis if there is one."""
     own = hypothesis_of_law(law_of_sum(of, recording), of.axis, recording)
     return own if of.partner is None else combine(own, hypothesis_of_sum(of.partner, recording))
 
 
 def laws_of(hypothesis: Hypothesis) -> tuple[Law | None, ...]:
-    """Per claim, with its parameters as they are fitted; None for what has a name."""
+    """Law of each claim with its fitted parameters; None for a claim whose effect is in the catalogue."""
     return tuple(
         None
         if claim.effect.law is None
@@ -64,5 +72,6 @@ def laws_of(hypothesis: Hypothesis) -> tuple[Law | None, ...]:
 
 
 def _values_in_order(values: object) -> Sequence[float]:
+    """Values of p0, p1, … in this order."""
     assert isinstance(values, dict)
     return [values[f"p{place}"] for place in range(len(values))]

@@ -1,4 +1,8 @@
-"""Converts the residuals of a simulation to evidence for starting values: the missing force along each axis."""
+"""Convert the residuals of a simulation to `Evidence`, from which an effect's starting values are estimated.
+
+A Wiener deconvolution (`missing_force`) gives the force along each driven axis that would explain the residuals, and
+the motion that it adds to the simulated one. The laws of the effects are then regressed on this force and motion.
+"""
 
 import numpy as np
 
@@ -10,7 +14,8 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 EXPECTED = 0.1
-"""Expected rms of a missing force, relative to the command's."""
+"""Expected rms of a missing force, relative to the rms of the command along the same axis: the prior of the
+deconvolution."""
 
 
 def evidence_of(
@@ -20,8 +25,9 @@ def evidence_of(
     left: FloatArray,
     scales: tuple[FloatArray, FloatArray],
 ) -> Evidence:
-    """The evidence of one record. left: (n, c), residuals of the simulation. scales: the error measure's unit and
-    noise, (c,) each."""
+    """The evidence of one record. simulated: with the driven axes' motion. left: (n, c), residuals in units of the
+    first of `scales`; NaN for missing samples, which count as zero. scales: the error measure's unit and noise, (c,)
+    each, in the channels' units."""
     unit, noise = scales
     residuals = np.where(np.isfinite(left), left, 0.0)
     rate_hz, p = record.recording.sample_rate_hz, model.outputs
@@ -50,7 +56,7 @@ def without_gaps(
     measured: FloatArray, residuals: FloatArray, simulated: SimulationResult
 ) -> tuple[FloatArray, FloatArray]:
     """Measured and predicted signals, (n, c) each, without gaps: missing samples are replaced by the simulation in
-    both, so that their difference is zero."""
+    both, so that their difference is zero. residuals: (n, c), in the channels' units."""
     known = np.isfinite(measured)
     predicted = np.hstack([simulated.response, simulated.position])[:, : measured.shape[1]]
     predicted = np.where(known, measured - residuals, predicted)

@@ -1,4 +1,10 @@
-"""Error measure by free simulation: the measured signals against a simulation from the commands alone."""
+"""Output error: the measured signals less a simulation from the commands alone (free simulation).
+
+    e(t) = (y(t) - yhat(t)) / unit        yhat: simulated from rest at the first sample, without measured feedback
+
+The residual holds the noise and the whole effect of the missing physics, because no measured sample corrects the
+simulation. The other measures of `error_measure` compare windows, or forces.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,39 +33,45 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeSimulation:
-    """Output error of a simulation that starts at rest at the first sample and sees the commands alone."""
+    """Output error of a simulation that starts at rest and is driven by the commands alone; an `ErrorMeasure`. The c
+    channels are those of the response, then those of the position where it was measured."""
 
     records: tuple[Observed, ...]
     unit: FloatArray
-    """(c,): unit of the residuals: the rms noise, with the floor of `with_floor` added."""
+    """(c,): unit of the residuals, in each channel's unit: the rms noise, the floor of `with_floor` added in power."""
     noise: FloatArray
-    """(c,): rms noise."""
+    """(c,): rms noise, in each channel's own unit, with the same floor added."""
     name: str = "free simulation"
     known: tuple[PlacedEffect, ...] = ()
-    """Effects named in the model's own file, which are part of every simulation."""
+    """Effects that the file of the model states; every simulation contains them."""
     least: float = 0.0
-    """Least error in units of the noise: smaller ones are set to it; 1 with a floor."""
+    """Least error in units of the noise, to which smaller errors are set; 1 with a floor."""
     coarser: int = 1
-    """Factor on the length of time steps under motion-dependent forces."""
+    """Factor by which the time steps of motion-dependent forces are lengthened."""
     pieces: tuple[Restarts, ...] = ()
-    """Per record, where its parts were joined, and the states in which these begin; empty where records are whole."""
+    """Per record, the samples at which its parts were joined, and the state in which each part begins; empty where no
+    record consists of parts."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        """The measure on other records, also of another length: each is taken as whole, and `pieces` is emptied."""
+        """The measure on other records, of any length. Each counts as a single part: `pieces` is emptied."""
         return replace(self, records=records, pieces=())
 
     def with_floor(self, rms: FloatArray) -> Self:
+        """The measure with noise of this rms (c,) added in power, and 1 as its least error."""
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shorten(self) -> "FreeSimulation":
+        """The measure without the samples after the last to fit or to choose by, and without records that have none."""
         kept = [record for record in self.records if (record.fit | record.choose).any()]
         return replace(self, records=tuple(record.shorten() for record in kept))
 
     def can_observe(self, effect: Effect) -> bool:
+        """True for every effect: each changes the simulated response or position."""
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        with np.errstate(over="ignore", invalid="ignore"):  # a simulation may diverge
+        """Per record (n, c): measured less simulated, in units of `unit`; NaN where a sample is missing."""
+        with np.errstate(over="ignore", invalid="ignore"):  # A simulation of trial parameters may diverge.
             return tuple(
                 _subtract_prediction(record.measured, self._simulate(model, effects, record, simulate_response, joined))
                 / self.unit
@@ -69,7 +81,7 @@ class FreeSimulation:
     def states_before(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, at: npt.NDArray[np.int64]
     ) -> FloatArray:
-        """States of the simulation just before given samples of a record: positions and velocities (k, 2n)."""
+        """States just before the samples `at` (k,) of a record: positions, then velocities (k, 2n)."""
         signals = record.recording
         every = effects_under_conditions((*self.known, *effects), signals)
         model = add_carried_weight(model, signals)
@@ -83,6 +95,7 @@ class FreeSimulation:
         simulate: Callable[..., SimulationResult],
         joined: Restarts | None = None,
     ) -> SimulationResult:
+        """One record simulated by the function `simulate`, or restarted at each part where parts were joined."""
         signals, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
@@ -98,6 +111,8 @@ class FreeSimulation:
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
+        """Per record, the motion and missing force from which starting values are estimated. residuals: of the same
+        model and effects."""
         found = []
         for record, left in zip(self.records, residuals, strict=True):
             simulated = self._simulate(model, effects, record, simulate_mechanism)
@@ -107,7 +122,8 @@ class FreeSimulation:
 
 
 def _coarsen(placed: PlacedEffect, times: int) -> PlacedEffect:
-    """The effect with `times` times longer time steps."""
+    """The effect with time steps about `times` times longer, at least one step per sample; other effects than
+    motion-dependent forces unchanged."""
     acts = placed.effect.acts
     if times == 1 or not isinstance(acts, (AxisForce, JointForce)):
         return placed
@@ -116,7 +132,7 @@ def _coarsen(placed: PlacedEffect, times: int) -> PlacedEffect:
 
 
 def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> FloatArray:
-    """The residual: measured less simulated signals."""
+    """(n, c): measured less simulated signals, in the channels' units: the response, then the position if measured."""
     p, rest = simulated.response.shape[1], measured.copy()
     rest[:, :p] -= simulated.response
     rest[:, p:] -= simulated.position[:, : rest.shape[1] - p]
@@ -124,5 +140,5 @@ def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> F
 
 
 def predict_channels(simulated: SimulationResult, count: int) -> FloatArray:
-    """(n, count): the response and, where `count` includes it, the position."""
+    """(n, count): the first `count` simulated channels, the response before the position."""
     return np.hstack([simulated.response, simulated.position])[:, :count]

@@ -1,17 +1,19 @@
-"""The end of a fit, and standard errors that hold where residuals are neither white nor of the assumed variance.
+"""Final steps of a fit, and standard errors valid where residuals are neither white nor of the assumed variance.
 
-End: a search compares fits at shares of their cost, which with 10^5 samples may leave a parameter several standard
-errors from the minimum. The final fit goes on until the sum of squares falls by less than `FINISHED`. Its sensitivities
-are central differences: parameters that change the prediction alike (a mass that was added, and the model's own) must
-have proportional columns, and the curvature in one-sided differences would count as information that separates them.
+Final fit (`finish_fit`): a search stops at a relative change of the cost, which with 10^5 samples may leave a parameter
+several standard errors from the minimum. Gauss-Newton steps therefore continue until the sum of squares falls by less
+than `FINISHED`. Sensitivities are central differences: parameters with the same effect on the prediction (an added mass
+and the model's own) must have proportional columns; curvature in one-sided differences would seem to separate them.
 
-Noise: sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches longer than the residuals'
-correlation time. Where a drive repeats, so does what a model cannot reproduce: the same stretch of all periods of a
-segment is one cluster (Liang and Zeger, Biometrika 73:13, 1986), where that shows more. Systematic errors: no law is
-exact, so that another level or axis would give other numbers; delete-one jackknife over segments (Efron and Stein, Ann.
-Stat. 9:586, 1981), each estimate by one Gauss-Newton step,
+Random errors (`standard_errors`): sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches
+longer than the residuals' correlation time. Under periodic excitation model errors repeat: the same stretch of all
+periods of a segment is one cluster (Liang and Zeger, Biometrika 73:13, 1986), where that gives the larger error.
+Systematic errors (`segment_errors`): no law is exact, so that another level or axis would give other estimates;
+delete-one jackknife over segments (Efron and Stein, Ann. Stat. 9:586, 1981), each estimate by one Gauss-Newton step,
 
-    theta_g - theta = -(A - A_g)^-1 b_g,   A = sum of A_g + prior,   A_g = X_g X_g',   b_g = X_g r_g.
+    theta_g - theta = -(A - A_g)^-1 b_g,   A = sum of A_g + prior,   A_g = X_g X_g',   b_g = X_g r_g,
+
+with the sensitivities X_g (parameters, samples) and the residuals r_g of segment g.
 """
 
 from collections.abc import Callable, Iterator
@@ -34,26 +36,28 @@ from equalizer.signals.signal import FloatArray
 Places = npt.NDArray[np.int64]
 
 STRETCH_S = 0.5
-"""Length of the stretches over which residuals are summed: longer than their correlation time."""
+"""Length (s) of the stretches over which scores are summed: longer than the residuals' correlation time."""
 AT_AN_END = 1e-6
-"""Distance of a coordinate from its bound up to which it counts as at the bound."""
+"""Distance of a coordinate from its bound at or below which it counts as at the bound."""
 FINISHED = 0.01
 """Fall of the sum of squares, in noise variances, that ends a fit: the minimum is then within a tenth of a standard
 error."""
 FINISHING = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
-"""As `DAMPINGS`; less, so that the calibration decides along a valley that the data leave flat."""
+"""Dampings of the final steps (see `DAMPINGS`), smaller than in a search: in a direction that the data do not
+determine, the prior of the calibration must decide, not the damping."""
 MOST_ROUNDS, STEPS = 4, 3
-"""Rounds at most, each with a sensitivity of its own, and steps of each."""
+"""Largest number of rounds, each with a newly computed sensitivity, and of Gauss-Newton steps per round."""
 FINER_LINEAR, FINER = 0.02, 0.2
-"""Steps of the central differences, over those of a search: of a linear simulation, where what curvature remains is the
-only error; and under effects with thresholds or solved forces, whose own errors a short step would magnify."""
+"""Steps of the central differences, relative to those of a search. Linear simulation: short, because curvature is the
+only error. Other effects, with thresholds or forces that are solved for: longer, because a short step would magnify the
+numerical errors of the simulation."""
 
 
 def sensitivity_to_all(
     measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis, map_: Mapper = map
 ) -> Sensitivity:
     """Sensitivity (t + parameters, samples) to the model's parameters, then to the hypothesis's parameters, by central
-    differences; one-sided at a bound and where the other side gives no valid model."""
+    differences; one-sided at a bound and where the other side gives no valid model, zero where neither does."""
     t, placed = len(deviations), hypothesis.list_placed_effects()
     linear = all(isinstance(each.effect.acts, Structure) for each in placed)
     finer = FINER_LINEAR if linear else FINER
@@ -87,7 +91,8 @@ def sensitivity_to_all(
 
 
 def _both_ways(hypothesis: Hypothesis, number: int, finer: float) -> tuple[float, float]:
-    """Steps down and up within the bounds. number: of the hypothesis; below 0: of the model."""
+    """Steps down and up within the bounds. number: index among the hypothesis's parameters; below 0: a parameter of the
+    model."""
     if number < 0:
         return -finer * DIFFERENCE_STEP, finer * DIFFERENCE_STEP
     (low, high), at = hypothesis.parameters[number].bounds, hypothesis.point[number]
@@ -103,8 +108,8 @@ def finish_fit(
     time_left: TimeBudget,
 ) -> tuple[Fitted, Sensitivity]:
     """The fit at its minimum, and the sensitivity to all its parameters there. sensitivity_of: as `sensitivity_to_all`;
-    computed once, and again after steps that lowered the sum of squares by more than `FINISHED`, also where no time is
-    left for further steps."""
+    called once, and again after each round that lowered the sum of squares by `FINISHED` or more, even where no time
+    is left for further steps."""
     known, samples = sensitivity_of(fitted), len(residuals_to_fit(measure, fitted.residuals))
     for _ in range(MOST_ROUNDS):
         begun = fitted.cost
@@ -115,7 +120,7 @@ def finish_fit(
             gained, fitted = samples * (fitted.cost - better.cost), better
             if gained < FINISHED:
                 break
-        if not samples * (begun - fitted.cost) >= FINISHED:  # nor where both costs are infinite
+        if not samples * (begun - fitted.cost) >= FINISHED:  # also where both costs are infinite (NaN)
             break
         known = sensitivity_of(fitted)
         if not time_left():
@@ -124,14 +129,15 @@ def finish_fit(
 
 
 def _normal_equations(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> tuple[FloatArray, FloatArray]:
-    """Normal matrix and right side of a Gauss-Newton step in all parameters, with the calibration as observations."""
+    """Normal matrix and right side of a Gauss-Newton step in all parameters, with the calibration as prior."""
     rhs, t = known.on(residuals_to_fit(measure, fitted.residuals)), len(fitted.deviations)
     rhs[:t] -= fitted.deviations
     return _with_calibration(known.squares, t), rhs
 
 
 def _with_calibration(squares: FloatArray, t: int) -> FloatArray:
-    """The calibration is one more observation per parameter of the model, with a standard deviation of one."""
+    """Normal matrix with the prior of the calibration: one observation of each of the model's t parameters, with a
+    standard deviation of 1 in its coordinate."""
     whole = squares.copy()
     whole[:t, :t] += np.eye(t)
     return whole
@@ -141,8 +147,8 @@ def standard_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -
     """(t + parameters,): standard errors of the deviations and of the hypothesis's point; 0 for parameters at a bound.
     known: sensitivity to all parameters (`sensitivity_to_all`).
 
-    Scores sum to zero at the minimum, so that few clusters show too little: the larger of the errors with and without
-    periods in one cluster is taken."""
+    Scores sum to zero at the minimum, so that few clusters underestimate the variance. The larger of two estimates is
+    returned: with all periods of a segment in common clusters, and with separate ones."""
     t, free = len(fitted.deviations), _free(fitted)
     errors = residuals_to_fit(measure, fitted.residuals)
     information = _with_calibration(known.squares * np.outer(free, free), t)
@@ -156,7 +162,8 @@ def standard_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -
 
 
 def segment_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) -> FloatArray | None:
-    """(t + parameters,): jackknife standard errors over segments; None where there is one segment. known: as above."""
+    """(t + parameters,): jackknife standard errors over segments; None where there is a single segment. known: as in
+    `standard_errors`."""
     errors, free = residuals_to_fit(measure, fitted.residuals), _free(fitted)
     products, scores = [], []
     for begin, end in _segments(measure):
@@ -176,7 +183,8 @@ def segment_errors(measure: ErrorMeasure, fitted: Fitted, known: Sensitivity) ->
 
 
 def _segments(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
-    """Ranges of the residuals to fit, one per segment with the rest after it, or per recording without segments."""
+    """Ranges (begin, end) of the residuals to fit: one per segment, up to the next, or one per recording without
+    segments."""
     first = 0
     for record in measure.records:
         width, samples = record.measured.shape[1], np.flatnonzero(record.fit)
@@ -187,7 +195,7 @@ def _segments(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
 
 
 def _free(fitted: Fitted) -> Mask:
-    """(t + parameters,): whether a parameter is not at one of its bounds; the model's parameters always count."""
+    """(t + parameters,): whether a parameter is away from its bounds; always true for the model's parameters."""
     point, ends = fitted.hypothesis.point, [free.bounds for free in fitted.hypothesis.parameters]
     away = [not np.isclose(at, of, rtol=0.0, atol=AT_AN_END).any() for at, of in zip(point, ends, strict=True)]
     return np.array([True] * len(fitted.deviations) + away, dtype=np.bool_)
@@ -195,7 +203,7 @@ def _free(fitted: Fitted) -> Mask:
 
 def _scores(measure: ErrorMeasure, known: Sensitivity, errors: FloatArray, folded: bool) -> FloatArray:
     """(t + parameters, clusters): score of each parameter (column times residual), summed per cluster. folded: as
-    below."""
+    in `_clusters`."""
     sums: list[FloatArray] = []
     first = 0
     for record in measure.records:

@@ -4,17 +4,16 @@ Theory of operation. Unknowns are d, the deviations of the model's own parameter
 calibration, and p, the parameters of a hypothesis (scaled to logarithms, starts or units). With the prediction errors e
 in units of the noise,
 
-    J(d, p) = (sum of e(d, p)² + d'd) / N            over the N samples to fit;  |d| <= Tuning.bound,  p within bounds
+    J(d, p) = (sum of e(d, p)² + d'd) / N       over the N residuals to fit (samples times channels of all records)
 
-d'd is the calibration's prior: a maximum a posteriori estimate. One step solves, with S = [de/dd, de/dp],
+subject to |d| <= Tuning.bound and p within its limits. d'd is the calibration's Gaussian prior, so that the minimum is
+the maximum a posteriori estimate. One step solves, with S = [de/dd, de/dp],
 
     (S'S + diag(1, 0)) step = -(S'e + (d, 0))        parameters that would leave their range are fixed at its end
 
 with growing multiples of the matrix's diagonal added until J falls (Marquardt's damping). de/dd costs one simulation
 per parameter of the model, so it is computed once and kept; de/dp is recomputed at each step, by finite differences.
-Standard errors: `intervals`.
-
-References: Ljung, System Identification (1999), section 10.2; Marquardt, J. SIAM 11:431 (1963).
+Standard errors: `intervals`. Sources: Ljung, System Identification (1999), sec. 10.2; Marquardt, J. SIAM 11:431 (1963).
 """
 
 from collections.abc import Sequence
@@ -32,22 +31,22 @@ from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelErr
 from equalizer.signals.signal import FloatArray
 
 DIFFERENCE_STEP = 0.1
-"""Step of the finite differences, in standard deviations."""
+"""Step of the finite differences for the model's parameters, in standard deviations of the calibration."""
 Dampings = Sequence[tuple[float, bool]]
-"""Shares of the normal matrix's diagonal that are added, and whether the step is one of values (`move_point`)."""
+"""Per trial, the share of the normal matrix's diagonal that is added, and the argument `straight` of `move_point`."""
 DAMPINGS: Dampings = ((1e-9, False), (1e-3, False), (0.1, False), (3.0, False))
 LARGEST_STEPS = {"log": 1.0, "signed": 10.0, "linear": np.inf}
-"""Largest step of a hypothesis's parameter, by its scale: a factor of e; a multiple of its start; unlimited."""
+"""Largest step of an effect's parameter, by its scale: a factor of e; ten times its starting value; unlimited."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """Sensitivity of the prediction to the model's own parameters, or to all parameters, on the samples to fit."""
+    """Jacobian of the prediction at the residuals to fit ("samples" below): of the model's, or of all t parameters."""
 
     at: FloatArray
     """(t,): deviations (standard deviations of the calibration) at which it was computed."""
     columns: FloatArray
-    """(t, samples): change of the prediction per standard deviation."""
+    """(t, samples): change of the prediction per standard deviation, in units of the noise: -de/dd."""
     squares: FloatArray
     """(t, t): Gram matrix of the columns."""
     repeated: npt.NDArray[np.int64] | None = None
@@ -62,8 +61,8 @@ class Sensitivity:
         return products if errors.ndim > 1 else products[:, 0]
 
     def over(self, first: int, last: int) -> FloatArray:
-        """(t, last - first): columns on a run of the samples to fit, channel after channel at each instant; whole
-        instants."""
+        """(t, last - first): columns on the residuals `first` to `last`, ordered by instant, then by channel; both
+        limits are multiples of the number of channels."""
         if self.repeated is None:
             return self.columns[:, first:last]
         t, c = len(self.columns), self._channels
@@ -96,11 +95,11 @@ class Fitted:
     residuals: tuple[FloatArray, ...]
     """Residuals per record (n, c), in units of the noise."""
     cost: float
-    """Cost: mean square over the fitting samples, plus the prior of the calibration."""
+    """The cost J of the module's equation."""
 
 
 def residuals_to_fit(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
-    """The residuals of the samples to fit, all records in one row."""
+    """(samples,): the residuals of the samples to fit, of all records and channels in one row."""
     parts = [each[record.fit].ravel() for each, record in zip(residuals, measure.records, strict=True)]
     return np.concatenate(parts)
 
@@ -113,8 +112,8 @@ def sensitivity(
     map_: object = map,
     beside: tuple[FloatArray, Sequence[int]] | None = None,
 ) -> Sensitivity:
-    """Sensitivity to the model's own parameters by finite differences. map_: `map`, or a parallel one. beside: known
-    columns, and the indices of those that must be computed."""
+    """Sensitivity to the model's own parameters by finite differences. map_: `map`, or a parallel equivalent.
+    beside: known columns (t, samples), and the indices of those that must be computed; None = all."""
     base = residuals_to_fit(measure, measure.residuals(tuning.tune(at), hypothesis.list_placed_effects()))
 
     def moved(number: int) -> FloatArray:
@@ -145,7 +144,7 @@ def fit(
     measure: ErrorMeasure, tuning: Tuning, start: Fitted, known: Sensitivity, rounds: int, map_: object = map
 ) -> Fitted:
     """The best fit within a number of Gauss-Newton steps; never worse than the start. known: sensitivity to the model's
-    parameters, computed anywhere near. map_: as for `sensitivity`."""
+    parameters, computed at a point nearby. map_: as for `sensitivity`."""
     best = start
     for _ in range(rounds):
         better = _gauss_newton_step(measure, tuning, best, known, map_)
@@ -159,8 +158,8 @@ def fit(
 
 
 def expect_gain(gained: float, before: float) -> float:
-    """Share of the cost that the next fit may gain, after `gained` by the last and `before` by the one before it: gains
-    shrink about geometrically."""
+    """Reduction of the cost expected of the next fit, after `gained` by the last fit and `before` by the fit before it:
+    reductions shrink about geometrically."""
     return gained * min(gained / before, 1.0) if before > 0 else gained
 
 
@@ -171,7 +170,7 @@ def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, 
 
 
 def _cost(errors: FloatArray, deviations: FloatArray) -> float:
-    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
+    with np.errstate(over="ignore", invalid="ignore"):  # A simulation may have diverged.
         cost = float(errors @ errors + deviations @ deviations) / max(len(errors), 1)
     return cost if np.isfinite(cost) else np.inf
 
@@ -179,6 +178,7 @@ def _cost(errors: FloatArray, deviations: FloatArray) -> float:
 def _gauss_newton_step(
     measure: ErrorMeasure, tuning: Tuning, from_: Fitted, known: Sensitivity, map_: object
 ) -> Fitted | None:
+    """The fit after one step; None where no step lowers the cost, or a derivative is not finite."""
     errors = residuals_to_fit(measure, from_.residuals)
     own = hypothesis_sensitivity(measure, tuning, from_, errors, map_)
     t = len(from_.deviations)
@@ -251,7 +251,8 @@ def _longest_s(measure: ErrorMeasure) -> float:
 def hypothesis_sensitivity(
     measure: ErrorMeasure, tuning: Tuning, from_: Fitted, errors: FloatArray, map_: object = map
 ) -> FloatArray:
-    """(parameters, samples): sensitivity of the prediction to the hypothesis's parameters."""
+    """(parameters, samples): change of the prediction per unit of each coordinate of the hypothesis, -de/dp. errors:
+    residuals to fit at `from_`."""
     model: MechanicalModel = tuning.tune(from_.deviations)
     moves = [free.move for free in from_.hypothesis.parameters]
 
@@ -278,8 +279,8 @@ def _longest(hypothesis: Hypothesis) -> FloatArray:
 
 
 def solve_bounded_step(products: FloatArray, rhs: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Least-squares step within bounds: parameters that would leave their range are fixed at its end (active set).
-    products, rhs: matrix and right-hand side of the normal equations."""
+    """Least-squares step (t,) within bounds: parameters that would leave their range are fixed at its end (active set).
+    products, rhs: matrix (t, t) and right-hand side (t,) of the normal equations."""
     step, held = np.zeros(len(rhs)), np.zeros(len(rhs), dtype=bool)
     for _ in range(2 * len(rhs) + 2):
         free = ~held

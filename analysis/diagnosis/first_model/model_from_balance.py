@@ -1,4 +1,10 @@
-"""Makes a linear model of a force balance: one body per command."""
+"""Builds a linear mechanical model M a + D v + K q = f from force balances, with one body per command.
+
+The rows of M, D and K are the weights of the balances without further laws; the matrices are then made symmetric. Their
+tolerance is half the largest change of an entry when the named laws are added to the balances, plus a share
+(`FOUND_NUMBERS_OPEN`) of the largest entry. A mass is at least `MASSLESS_SHARE` of the force's rms over that of the
+acceleration, because every motion of a model needs a mass.
+"""
 
 from collections.abc import Sequence
 
@@ -14,9 +20,9 @@ from equalizer.signals.signal import FloatArray
 
 
 def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
-    """A linear model with the masses, dampers and springs of force balances. recording: what `reduce_recordings` makes
-    of it, where the balances hold more than one body per command. None where not each command drives one measured
-    motion. Raises MechanicalModelError."""
+    """A linear model with the masses, dampers and springs of force balances, one per command. recording: reduced by
+    `reduce_recordings` where the balances hold more than one body per command. None where the commands do not drive one
+    measured motion each. Raises MechanicalModelError for matrices that are no valid model."""
     regressions = [balance.search.regression for balance in balances]
     count = len(balances)
     if count > len(regressions[0].motions[0].channels) or count != len(recording.response.channels):
@@ -55,14 +61,15 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
 
 
 def _common_delay_s(balances: Sequence[Balance]) -> float:
-    """The delay of all commands where the reduced recordings do not contain it; 0 where the commands have different
-    ones, because a model has a single delay."""
+    """The delay (s) that all commands share. 0 where their delays differ, because a model has a single delay, and where
+    the recordings are reduced, because the reduction already removes the delay."""
     delays = {balance.search.regression.beside.delay_s for balance in balances}
     return delays.pop() if len(delays) == 1 and not is_reduced(balances) else 0.0
 
 
 def plain_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
-    """`first_model` where laws are named along the motions of one body per command: then it needs no other fit."""
+    """`first_model` where at least one law is named and there is one body per command: no further fit is needed then.
+    Else None, as where the matrices are no valid model."""
     if not any(balance.named for balance in balances) or is_reduced(balances):
         return None
     try:
@@ -72,7 +79,8 @@ def plain_model(balances: Sequence[Balance], recording: Recording, name: str) ->
 
 
 def share_within(balances: Sequence[Balance], band_hz: float) -> float:
-    """Share of a named law's force power below a frequency; the least over the laws."""
+    """Share of the power of a named law's force at frequencies up to `band_hz`; the smallest over the named laws of the
+    motion, 1 without any."""
     shares = [1.0]
     for balance in balances:
         regression = balance.search.regression
@@ -88,8 +96,9 @@ def share_within(balances: Sequence[Balance], band_hz: float) -> float:
 
 
 def _mean_force(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
-    """The mean over all recordings is subtracted: where each runs one way, the friction differs between recordings at
-    frequency zero."""
+    """Share of the forces' power at frequencies up to `band_hz`. forces: (kept samples,) per motion. The mean over all
+    recordings is subtracted, not that of each: where each recording moves in one direction only, the friction differs
+    between recordings at frequency zero."""
     within, whole, mean = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))
     for force, motion in zip(forces, motions, strict=True):
         power = np.abs(np.fft.rfft(force - mean)) ** 2
@@ -99,7 +108,8 @@ def _mean_force(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz
 
 
 def _numbers(balance: Balance, laws: Sequence[int], places: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rows of the mass, damping and stiffness matrices for the motions at these places."""
+    """Rows of the mass, damping and stiffness matrices of one balance, fitted together with these laws. places:
+    channels of the driven motions. A row that the balance does not fit is zero."""
     regression = balance.search.regression
     weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
     d = len(regression.motions[0].channels)
@@ -108,4 +118,5 @@ def _numbers(balance: Balance, laws: Sequence[int], places: Sequence[int]) -> tu
 
 
 def _rms(samples: FloatArray) -> FloatArray:
+    """(k,): rms of each column (n, k) about its mean."""
     return np.asarray(np.sqrt(np.mean((samples - samples.mean(axis=0)) ** 2, axis=0)))

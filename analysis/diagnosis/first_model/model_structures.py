@@ -1,4 +1,9 @@
-"""Structures of a first model, each fitted to the same recordings, and the choice among them by held-out error."""
+"""Candidate structures of a first linear model, M a + D v + K x = u, and the choice among them by held-out error.
+
+A diagnosis to which no model was given starts from such a model. Each structure leaves some of the matrices out
+(`PARTS_OF`). All are fitted to the same recordings: by the force balance along the measured motion where every command
+has a measured position or velocity (`fit_structure`), else to spectra (`fit_modal_structure`).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -24,6 +29,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.unit_system import UnitSystem
 
 Kind = Literal["mass-spring", "two-mode", "gravity", "massless", "motor"]
+"""Structures: mass, damper and spring; the same with a mode on an axis; a pendulum, whose weight acts as a spring;
+damper and spring alone; mass and damper alone."""
 KINDS: tuple[Kind, ...] = get_args(Kind)
 PARTS_OF: dict[Kind, tuple[Part, ...]] = {
     "massless": ("damping", "stiffness"),
@@ -31,10 +38,13 @@ PARTS_OF: dict[Kind, tuple[Part, ...]] = {
     "mass-spring": PARTS,
     "gravity": PARTS,
 }
+"""Matrices that the force balance fits, by structure; "two-mode" is fitted to spectra only."""
 HELD_FIXED = 1e-6
-"""Factor of the least mass, and standard deviation of unknown parameters, without a time axis."""
+"""Without a time axis: factor on the least mass, and standard deviation that is stated for mass and damping."""
 NAME = "first model, {}"
+"""Name of the fitted model, to be filled in with its structure."""
 FORCE, MOTION = "force along the measured motion", "free simulation"
+"""Signals that held-out errors refer to, for `StructureFit.compared`."""
 
 
 class StructureRefused(ValueError):  # noqa: N818 - an answer that a user reads
@@ -63,32 +73,38 @@ class StructureFit:
     """Per axis or response channel: rms of the held-out error over that of the signal."""
     channels: tuple[str, ...]
     compared: str
-    """The compared signal, in words."""
+    """Signal that the held-out errors refer to, in words."""
     joint: JointFit | None
-    """The joint fit; None where it was fitted to accelerations, or has modes."""
+    """Result of the force balance; None for a fit to spectra (accelerations alone, or a structure with modes)."""
     remarks: tuple[str, ...]
 
     @property
     def error(self) -> float:
-        """The error by which structures are compared: cross-validated, else that of held-out samples."""
+        """Relative error by which structures are compared: cross-validated, else the rms of `held_out`."""
         return self.joint.folds_error if self.joint else float(np.sqrt(np.mean(np.square(self.held_out))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BalancedRecordings:
-    """Recordings whose motion was measured along every command."""
+    """Recordings whose motion was measured along every command, prepared for a force balance."""
 
     recording: Recording
+    """The first one: source of channels and units."""
     regressions: tuple[Regression, ...]
+    """Force balance of each axis, without laws."""
     untimed: bool
+    """Whether the recordings have no time axis: then only a stiffness can be fitted."""
     turns: bool
+    """Whether a shaft rotates freely, so that no spring can hold it."""
     rotational: bool
+    """Whether the motion is an angle: inertia in kg m², stiffness in N m/rad."""
     free: bool = False
     """Whether the motion is free (not driven): parameters are per unit mass."""
 
 
 def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
-    """The regressions of all axes. Raises NoMotionError where forces cannot be balanced along a measured motion."""
+    """Prepare the force balance of all axes. Raises NoMotionError where only accelerations were measured, a command has
+    no measured motion of its own, or no sample is usable."""
     first = recordings[0]
     motions = motions_of(observe_parts(recordings, len(first.response.channels)))
     count = len(first.command.channels)
@@ -106,7 +122,8 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
 
 
 def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
-    """A structure fitted by the force balance. Raises StructureRefused."""
+    """Fit a structure by the force balance. Raises StructureRefused where it does not suit the recordings, the motion
+    does not determine its parameters, or a mass or damping comes out negative."""
     _refuse(given, kind)
     parts: tuple[Part, ...] = ("stiffness",) if given.untimed else PARTS_OF[kind]
     if given.free:
@@ -134,7 +151,8 @@ def fit_structure(given: BalancedRecordings, kind: Kind) -> StructureFit:
 def fit_modal_structure(
     recordings: Sequence[Recording], kind: Kind, on_progress: Callable[[float], None]
 ) -> StructureFit:
-    """A structure fitted to spectra, for accelerations and for modes. Raises StructureRefused."""
+    """Fit "mass-spring" or "two-mode" to spectra, for measured accelerations and for modes. Raises StructureRefused for
+    other structures, where the fit fails, and where a mode does not lower the held-out error."""
     if kind not in ("mass-spring", "two-mode"):
         raise StructureRefused("it needs a measured position or velocity along every command")
     axes = len(recordings[0].command.channels)
@@ -163,8 +181,9 @@ def fit_modal_structure(
 
 
 def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
-    """Return the fit by force balance with the fewest parameters, among those that no richer fit beats significantly
-    over the folds."""
+    """Return the fit by force balance with the fewest parameters that no richer fit beats. A richer fit wins where its
+    cross-validated error power is lower by more than `RICHER_STRUCTURE_GAIN` of the plainer fit's, more than
+    `RICHER_STRUCTURE_ERRORS` standard errors over the folds, and more than `MODEL_FLOOR`²."""
     ordered = sorted(fits, key=lambda fit: (len(fit.parameters), fit.error))
     best = ordered[0]
     for other in ordered[1:]:
@@ -178,6 +197,7 @@ def choose_plainest(fits: Sequence[StructureFit]) -> StructureFit:
 
 
 def _refuse(given: BalancedRecordings, kind: Kind) -> None:
+    """Raise StructureRefused where the force balance of these recordings cannot determine the structure."""
     if given.untimed and kind != "massless":
         raise StructureRefused("no time is known, so neither speeds nor accelerations are: only massless can be fitted")
     if kind == "two-mode":
@@ -191,7 +211,8 @@ def _refuse(given: BalancedRecordings, kind: Kind) -> None:
 
 
 def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalModel:
-    """Raises MechanicalModelError."""
+    """The fitted matrices as a mechanical model, their standard errors as its tolerance. Raises MechanicalModelError
+    where a mass or damping is negative."""
     mass, damping, stiffness = (fit.matrices[part] for part in PARTS)
     if kind == "massless" or given.free:
         mass = np.diag(_least_mass(given.regressions[0].motions)) * (HELD_FIXED if given.untimed else 1.0)
@@ -202,6 +223,7 @@ def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalMo
     )
     if problems:
         raise MechanicalModelError(problems)
+    # A damping matrix with a negative eigenvalue would supply energy: only its diagonal is kept.
     if np.linalg.eigvalsh(damping)[0] < 0:
         damping = np.diag(np.diagonal(damping))
     eye = np.eye(len(mass))
@@ -222,7 +244,8 @@ def _model(given: BalancedRecordings, fit: JointFit, kind: Kind) -> MechanicalMo
 
 
 def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """(d,): least masses, which a simulation needs."""
+    """(d,), force over acceleration: masses whose inertial force is `MASSLESS_SHARE` of the measured force (standard
+    deviations). A simulation needs a mass, even where the recordings show none."""
     force = np.vstack([motion.force for motion in motions]).std(axis=0)
     moved = np.vstack([np.gradient(motion.velocity, 1 / motion.rate_hz, axis=0) for motion in motions]).std(axis=0)
     return np.asarray(MASSLESS_SHARE * force / np.maximum(moved, 1e-300))
@@ -231,6 +254,7 @@ def _least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np
 def _parameter_estimates(
     given: BalancedRecordings, fit: JointFit, units_and_parts: tuple[UnitSystem, Sequence[Part]]
 ) -> tuple[ParameterEstimate, ...]:
+    """Diagonal elements of the fitted matrices, with their 95 % intervals."""
     names, (system, parts) = given.recording.command.channels, units_and_parts
     return tuple(
         ParameterEstimate(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
@@ -241,6 +265,8 @@ def _parameter_estimates(
 
 
 def _modal_parameters(model: MechanicalModel, recording: Recording) -> tuple[ParameterEstimate, ...]:
+    """Mass, damping and stiffness along each driven axis, with 95 % intervals from the model's tolerance (1.96 standard
+    deviations); then, for a model with modes, all natural frequencies (Hz)."""
     along, found = driven_axes(model), []
     own = model.tolerance or Tolerance()
     spread = (own.mass_kg, own.damping_n_s_per_m, own.stiffness_n_per_m)
@@ -261,6 +287,7 @@ def _modal_parameters(model: MechanicalModel, recording: Recording) -> tuple[Par
 
 
 def _remarks(given: BalancedRecordings, kind: Kind) -> tuple[str, ...]:
+    """Sentences on what the parameters of a structure mean."""
     if kind == "gravity":
         return (
             "The weight is linearised: its stiffness is mass times lever times the acceleration of gravity at the mean "

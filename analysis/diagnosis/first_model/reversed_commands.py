@@ -1,12 +1,11 @@
-"""Finds and reverses commands whose sign is opposite to the motion that they drive, by an encoder or amplifier with
-reversed wiring.
+"""Find and reverse commands whose sign is opposite to the motion that they drive, as with reversed wiring of an encoder
+or amplifier.
 
-Mass, damping and dry friction take energy from a drive. With the wrong sign they would supply it, which no physical law
-does. So forces are balanced with both signs, with mass and damping non-negative in either; the reversed sign is
-accepted where it has a clearly smaller error on held-out folds. A spring alone does not determine the sign.
-
-A recording's `meta` lists the reversed commands, and a model of the device is written for the commands as they were
-recorded: see `recorded_conditions`.
+A passive device has no negative mass and no negative damping. The force of each axis, F = m a + d v + k x, is therefore
+balanced with both signs of the command, with m >= 0 and d >= 0 in either. The sign is reversed where that lowers the
+cross-validated error by more than `REVERSED_SIGN_GAIN`, and significantly (`is_better`). A spring alone does not
+determine the sign, because k may have either. The reversed commands are listed in the recording's `meta`; a model is
+written for the commands as they were recorded (`recorded_conditions`).
 """
 
 from collections.abc import Sequence
@@ -27,8 +26,9 @@ from equalizer.signals.signal import FloatArray, Signal
 
 
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """The recordings with such commands reversed, and a sentence. recordings: alike in channels, units and rate. A free
-    motion has no command that could be."""
+    """The recordings with such commands reversed, and a sentence about them. Unchanged, and "", where no sign is
+    reversed or the forces cannot be balanced. Where the motion was imposed, the response (force) is negated
+    instead. recordings: alike in channels, units and rate. A free motion has no command."""
     if is_read_as_free(recordings[0]):
         return recordings, ""
     driven = all_as_force_driven(recordings)
@@ -57,6 +57,7 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 
 
 def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
+    """Whether the force balance of an axis has a clearly smaller cross-validated error with the force negated."""
     plain, turned = (
         regression_of([replace(each, force=sign * each.force) for each in motions], axis, (), turns=False)
         for sign in (1.0, -1.0)
@@ -66,6 +67,7 @@ def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
 
 
 def _reverse(recording: Recording, imposed: bool, sign: FloatArray) -> Recording:
+    """The recording with each force times `sign` (m,): its response where the motion was imposed, else its commands."""
     if imposed:
         return replace(recording, response=_scale_channels(recording.response, sign))
     excitation = None if recording.excitation is None else _scale_channels(recording.excitation, sign)
@@ -73,4 +75,5 @@ def _reverse(recording: Recording, imposed: bool, sign: FloatArray) -> Recording
 
 
 def _scale_channels(signal: Signal, sign: FloatArray) -> Signal:
+    """The signal with its channels times `sign` (channels,)."""
     return replace(signal, samples=signal.samples * sign)

@@ -5,7 +5,7 @@ and the model's transfer H from the m forces to the c channels, both in units of
 
     f = (H* H + diag(1 / s²))^-1 H* r        s: expected rms of the force
 
-It is the mean of the posterior of a force with prior variance s² (a latent force in the sense of Rogers and Friis,
+This f is the posterior mean of a white Gaussian force of variance s² (a latent force in the sense of Rogers and Friis,
 Mech. Syst. Signal Process. 2021).
 """
 
@@ -19,7 +19,8 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SETTLING_S = 2.0
-"""Zeros appended to the record, so that its end does not wrap around to its start."""
+"""Length (s) of the zeros appended to the record: the discrete Fourier transform is periodic, and without them the
+motion at the record's end would wrap around to its start."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,19 +28,19 @@ class MissingForce:
     """Estimated missing force along m driven axes, and the motion that it causes."""
 
     force: FloatArray
-    """(n, m), N"""
+    """(n, m), N (N m)."""
     position: FloatArray
-    """(n, m): contribution of that force to the positions of the driven axes."""
+    """(n, m), m (rad): contribution of that force to the positions of the driven axes."""
     velocity: FloatArray
-    """(n, m): contribution to their velocities."""
+    """(n, m), m/s (rad/s): contribution of that force to the velocities of the driven axes."""
 
 
 def missing_force(
     model: MechanicalModel, residuals: FloatArray, unit: FloatArray, sample_rate_hz: float, expected_n: FloatArray
 ) -> MissingForce:
-    """Estimate the force along each driven axis that explains residuals (Wiener filter). residuals: (n, c) in units of
-    `unit` (c,); the response's channels, then the position's. expected_n: (m,), expected rms of such a force; larger
-    values pass more force and more noise."""
+    """Estimate the force along each driven axis that explains the residuals (Wiener filter). residuals: (n, c), divided
+    by `unit` (c,), the rms of the noise; channels of the response, then of the position. expected_n: (m,), expected rms
+    s of the force, N; a larger value passes more force and more noise."""
     n, c = residuals.shape
     length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
     transfer = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))
@@ -56,7 +57,8 @@ def missing_force(
 
 
 _WELL_CONDITIONED = 1e8
-"""Largest condition number of the mode shapes for which modal coordinates are used."""
+"""Largest condition number of the eigenvectors with which the modal form is used; beyond it, rounding errors would
+dominate, and each spectral line is solved for directly."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,12 +68,16 @@ class AxisTransfer:
     response: ComplexArray
     """To the response, as the sensor reads it."""
     position: ComplexArray
+    """To the position channels."""
     axis_position: ComplexArray
+    """To the positions of the driven axes."""
     axis_velocity: ComplexArray
+    """To the velocities of the driven axes."""
 
 
 def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: FloatArray) -> AxisTransfer:
-    """Transfer functions without effects and actuator. frequency_hz: (lines,)."""
+    """Transfer functions of the linear mechanism, without effects and actuator; the sensor's low-pass acts on the
+    response. frequency_hz: (lines,)."""
     steps = linear_steps(model, 1 / sample_rate_hz)
     m, p = model.inputs, model.outputs
     z = np.exp(2j * np.pi * frequency_hz / sample_rate_hz)
@@ -86,7 +92,7 @@ def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: F
 
 
 def _frequency_response(A: FloatArray, B: FloatArray, C: FloatArray, z: ComplexArray) -> ComplexArray:
-    """C (zI - A)^-1 B, (lines, rows, inputs)."""
+    """C (zI - A)^-1 B, (lines, rows, inputs); by the eigenvectors of A where they are well conditioned. z: (lines,)."""
     poles, shapes = np.linalg.eig(A)
     if np.linalg.cond(shapes) < _WELL_CONDITIONED:
         left, right = C @ shapes, np.linalg.solve(shapes, B.astype(complex))

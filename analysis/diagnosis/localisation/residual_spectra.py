@@ -1,4 +1,9 @@
-"""Spectra of a residual over all channels, response first, then position, from which the entry point is found."""
+"""Spectra of the residual (recording minus prediction) and of its noise, from which the entry point of a missing effect
+is found.
+
+Channels are those of the response, then of the position. A spectrum is that of the mean period (rfft / n, see
+`line_spectra`), on the lines from the first to the last that the excitation drives.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,21 +21,21 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _WINDOW_S = 2.0
-"""Length of a window where nothing is periodic."""
+"""Length (s) of a window of a recording that has no period."""
 _LEAST_AMPLITUDE = 0.1
-"""Least amplitude with which a channel counts, relative to the strongest channel of its signal."""
+"""Least amplitude of a channel in the model error, relative to the strongest channel of the same signal."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualSpectra:
-    """Experiments on the same lines."""
+    """Residual spectra of several experiments (periodic segments, or windows) on the same lines."""
 
     frequency_hz: FloatArray
     """(lines,), within the driven band"""
     residual: ComplexArray
     """(experiments, lines, channels)"""
     noise: FloatArray
-    """(experiments, lines, channels): expected |error|²."""
+    """(experiments, lines, channels): expected |error|² of the residual, by noise and by model error."""
     responses: int
     """Number of response channels."""
 
@@ -42,9 +47,9 @@ def residual_spectra(
     used: Mask | None = None,
     model_error: float = 0.01,
 ) -> ResidualSpectra | None:
-    """Spectra of mean periods; of windows of two seconds where nothing is periodic. None where there is neither, or the
-    noise is not known. used: (n,), the samples that count. model_error: share of the response on each line that counts
-    as noise: otherwise residuals of the re-tuned model on other axes would appear as a second force."""
+    """Spectra of each segment's mean period, or of windows of `_WINDOW_S` where nothing is periodic. None without
+    either, without known noise, or where no line is driven. used: (n,), usable samples. model_error: relative to the
+    response; counts as noise, or residuals of the re-tuned model on other axes would appear as a second force."""
     left = [recording.response.samples - prediction.response]
     noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:
@@ -79,12 +84,13 @@ def residual_spectra(
 
 
 def _whole_periods(periods: Periods, whole: Mask) -> Periods:
+    """The periods whose samples are all usable; `starts` may then be empty."""
     starts = tuple(start for start in periods.starts if whole[start : start + periods.length].all())
     return Periods(periods.index, periods.segment, starts, periods.settled)
 
 
 def _windows(recording: Recording, whole: Mask) -> list[Periods]:
-    """Windows of a recording without periods, each as a period of its own."""
+    """Windows of a recording without periods, each as a single period; segments of rest are left out."""
     length = min(round(_WINDOW_S * recording.sample_rate_hz), len(recording))
     found = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
@@ -96,8 +102,8 @@ def _windows(recording: Recording, whole: Mask) -> list[Periods]:
 
 
 def _response_power(recording: Recording, periods: Periods, position: bool) -> FloatArray:
-    """(lines, channels): squared magnitudes; a weak channel counts with a tenth of the strongest channel of its
-    signal."""
+    """(lines, channels): power of response (and position); a weak channel counts with the amplitude
+    `_LEAST_AMPLITUDE` of the strongest channel of its signal."""
     signals = [recording.response, *([recording.position] if position and recording.position is not None else [])]
     parts = []
     for signal in signals:
@@ -107,6 +113,8 @@ def _response_power(recording: Recording, periods: Periods, position: bool) -> F
 
 
 def _noise(noises: Sequence[ChannelNoise], floor_hz: FloatArray, lines_hz: FloatArray, periods: Periods) -> FloatArray:
+    """(lines, channels): expected power of the noise in the mean period. Averaging over `periods.count` periods does
+    not lower the rounding errors, which repeat with the motion."""
     parts = []
     for noise in noises:
         density = np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1)

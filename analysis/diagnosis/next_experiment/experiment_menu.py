@@ -1,4 +1,9 @@
-"""Recordings that a laboratory could make next, as commands for a simulation."""
+"""Menu of experiments that a laboratory could record next to discriminate rival effects, as commands to simulate.
+
+Sweeps at several levels, slow sinusoids, a longer sweep, pushes and releases, and a sweep with added mass:
+`propose_experiment` predicts by simulation how well each discriminates the rivals. Nothing exceeds the level already
+recorded. Commands are in the model's unit (N, N m, or that of the current).
+"""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -11,38 +16,39 @@ from equalizer.signals.excitation import apply_fades, log_sweep, sine
 from equalizer.signals.signal import FloatArray
 
 SLOWEST_HZ, SLOWEST_SHARE = 1.0, 0.1
-"""Lowest frequency of sweeps: absolute, or as a share of the usual end where the sample rate is low."""
+"""Lowest frequency of sweeps: in Hz, or as a share of their usual upper end; the lower of the two."""
 CYCLES, LONGER = 8.0, 5.0
-"""Length of an experiment in cycles of the sweep's lowest frequency, and how many times as long the longest is."""
+"""Length of an experiment in cycles of the sweep's lowest frequency, and the factor on it for the long sweep."""
 USUAL_HZ, USUAL_SHARE, FASTEST_SHARE = 240.0, 0.24, 0.45
-"""Highest frequency of sweeps: absolute, or as a share of the sample rate."""
+"""Upper end of sweeps: in Hz, or as a share of the sample rate, the lower of the two; and that of wide sweeps, as a
+share of the sample rate, below half of it."""
 ADDED_SHARE = 0.12
-"""Known weight to attach, relative to the grounded mass."""
+"""Known mass (or inertia) to attach, relative to the mean mass at the driven axes."""
 RELEASES = 4
 """Releases of the deflected handle in a free-decay experiment, to either side in turn."""
 _FADE = 1 / 16
-"""Fade at both ends, over an experiment's usual length."""
+"""Length of the fade at either end, over the usual length of an experiment."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
-    """A recording that could be made next: its commands, its words for the user, and its cost."""
+    """A recording that could be made next: its commands, its description for the user, and its cost."""
 
     words: str
     """What to record; ends the sentence "record …"."""
     commands: FloatArray
-    """(n, m)"""
+    """(n, m), in the unit of the model's commands"""
     kind: Literal["sweep", "slow", "step"]
     """Kind of the recording's segment."""
     added: float = 0.0
-    """Mass (or inertia) to attach beforehand."""
+    """Mass (kg, or kg m^2 of a rotational model) to attach beforehand; 0 = none."""
     minutes: float = 1.0
-    """Duration in minutes, which counts as the cost."""
+    """Assumed laboratory time (min): the cost by which `choose_experiment` divides the gain."""
 
 
 def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, level: float) -> tuple[Experiment, ...]:
-    """Recordings that can be proposed. axis: where the rivals act. level: the highest that was recorded; no higher one
-    is proposed."""
+    """Experiments that can be proposed. axis: driven axis on which the rivals act. level: largest command recorded on
+    it, above 0; no experiment exceeds it."""
     usual_hz = min(USUAL_HZ, USUAL_SHARE * sample_rate_hz)
     fastest_hz = FASTEST_SHARE * sample_rate_hz
     slowest_hz = min(SLOWEST_HZ, SLOWEST_SHARE * usual_hz)
@@ -85,8 +91,9 @@ def experiment_menu(model: MechanicalModel, sample_rate_hz: float, axis: int, le
 
 
 def _is_held(model: MechanicalModel, axis: int, slowest_hz: float) -> bool:
-    """Whether a constant force moves the axis at most twice as far as a sinusoid of the sweep's lowest frequency does.
-    One that no stiffness holds, or a soft one, would be driven away."""
+    """Whether a constant force deflects the axis at most twice as far as a sinusoid of the sweep's lowest frequency:
+    an axis without stiffness, or with little, would be driven away. From the static compliance b' K^-1 b and the
+    dynamic one b' (M s^2 + D s + K)^-1 b, with b the axis."""
     axes = driven_axes(model)[:, axis]
     s = 2j * np.pi * slowest_hz
     try:
@@ -98,7 +105,8 @@ def _is_held(model: MechanicalModel, axis: int, slowest_hz: float) -> bool:
 
 
 def _pushes(sweep: str, level: float, half: FloatArray, fade: int) -> tuple[Experiment, Experiment]:
-    """Experiments with a constant push. sweep: in words; half: (n, m), at half the level; fade: samples."""
+    """Experiments with a static force: a sweep about another position, and releases from deflection. sweep: its
+    description. half: (n, m), the sweep at half the level. fade: samples."""
     along = (np.abs(half).max(axis=0) > 0).astype(np.float64)
     samples = len(half)
     push = apply_fades(np.full(samples, level / 2), fade, fade)
@@ -117,8 +125,8 @@ def _pushes(sweep: str, level: float, half: FloatArray, fade: int) -> tuple[Expe
 
 
 def _releases(level: float, samples: int) -> FloatArray:
-    """(n,): ramps up to the level, to either side in turn, each followed by as long a rest: after it the device moves
-    freely."""
+    """(n,): ramps up to the level, in either direction in turn, each followed by zero force for as long: the device
+    then decays freely."""
     half = samples // (2 * RELEASES)
     ramp = np.append(np.linspace(0.0, level, half), np.zeros(half))
     signs = [1.0 if number % 2 == 0 else -1.0 for number in range(RELEASES)]
@@ -126,6 +134,7 @@ def _releases(level: float, samples: int) -> FloatArray:
 
 
 def _find_grounded_mass(model: MechanicalModel) -> float:
+    """Mean mass at the driven axes, in kg or kg m^2."""
     axes = driven_axes(model)
     return float(np.diagonal(axes.T @ model.mass @ axes).mean())
 

@@ -9,10 +9,10 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import line_spectra
 
 _TRANSIENT_RATIO = 2.0
-"""Ratio of a period's difference from the last one, first third over last third (energy), above which it has not
-settled."""
+"""Largest energy ratio, first third over last third, of a period's difference from the segment's last period; above it
+the difference still decays, so that the period contains the transient."""
 _SHORTEST = 8
-"""Shortest period in samples: below it there are too few lines."""
+"""Shortest period that is used, in samples: a shorter one has too few spectral lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Periods:
     starts: tuple[int, ...]
     """First samples of the complete, settled periods; at least one."""
     settled: bool
-    """False: there is only the first period, with its transient."""
+    """False if only the segment's first period is usable, which contains the transient."""
 
     @property
     def length(self) -> int:
@@ -38,7 +38,7 @@ class Periods:
         return len(self.starts)
 
     def frequency_hz(self, sample_rate_hz: float) -> FloatArray:
-        """(lines,): frequencies of the lines of `spectra`."""
+        """(lines,): frequencies of the lines of `period_spectra`, without zero and half the rate."""
         lines: FloatArray = np.arange(1.0, (self.length + 1) // 2) * (sample_rate_hz / self.length)
         return lines
 
@@ -59,12 +59,13 @@ def find_settled_periods(recording: Recording) -> tuple[Periods, ...]:
 
 
 def period_samples(samples: FloatArray, periods: Periods) -> FloatArray:
-    """(periods, length, channels)"""
+    """Samples of the usable periods, (periods, length, channels). samples: (n, channels)."""
     return np.stack([samples[start : start + periods.length] for start in periods.starts])
 
 
 def period_spectra(samples: FloatArray, periods: Periods) -> ComplexArray:
-    """(periods, lines, channels); lines as in `Periods.frequency_hz`."""
+    """Spectrum (rfft / length) of each usable period, (periods, lines, channels), on the lines of
+    `Periods.frequency_hz`."""
     return line_spectra(period_samples(samples, periods))
 
 
@@ -74,12 +75,15 @@ def mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
 
 
 def _is_whole(recording: Recording, start: int, length: int) -> bool:
+    """Whether no sample of the period is missing (NaN), in command, response and position."""
     signals = [recording.command.samples, recording.response.samples]
     signals += [] if recording.position is None else [recording.position.samples]
     return all(bool(np.isfinite(samples[start : start + length]).all()) for samples in signals)
 
 
 def _after_transients(recording: Recording, starts: list[int], length: int) -> list[int]:
+    """The periods after the transient: leading periods are dropped, except for the last two, while their difference
+    from the last period decays within a period (`_TRANSIENT_RATIO`)."""
     samples, third = recording.response.samples, length // 3
     while len(starts) > 2:
         apart = samples[starts[0] : starts[0] + length] - samples[starts[-1] : starts[-1] + length]

@@ -1,5 +1,10 @@
-"""Comparison of recordings of a real device with clean ones of the same device: faults by `contrast`, and faults that
-the recordings show directly."""
+"""Comparison of recordings of a faulty device with reference recordings of the same device without the fault.
+
+First, faults that the recordings show directly are looked for: sensor faults in the readings, hum in a spectrum, steps
+of a quantized command, additional sensor noise. Without any, `contrast.compare` tests every fault of the catalogue by
+the error that it removes from a base model that is fitted to both sets of recordings. A recording is called clean where
+it is such a reference.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,27 +27,32 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 NOISE, STEPS = "sensor_noise", "force_quantization"
+"""Names of these two effects in the catalogue."""
 LARGEST_CLEAN_ERROR = 0.02
-"""Prediction error of a model on a clean recording, as a share, up to which it is used alone to find faults. By hand,
-as the next."""
+"""Relative prediction error of a model on a clean recording up to which the model is used alone to find faults. Chosen
+by hand, as `NOISY`."""
 NOISY = 0.1
-"""Share of the signal above which the variation between repeats is more than noise: a device with stick-slip."""
+"""Variation between repeats, relative to the signal's standard deviation, above which it is more than sensor noise, as
+of a device with stick-slip."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contrast:
-    """Faults that distinguish the recordings from clean ones; at most one of the first three."""
+    """Faults that distinguish the recordings from clean ones. Of `shown`, `line` and `comparison` at most one is not
+    None."""
 
     shown: Hypothesis | None
     """A sensor fault that the readings themselves show."""
     line: SignalFault | None
-    """A fault that a spectrum or the steps of a command show."""
+    """A fault that the spectrum, the steps of a command or the noise shows."""
     comparison: Comparison | None
-    """The comparison of all faults by a base model."""
+    """Test of every fault with a base model; None also where the recordings do not allow it."""
     decision: Decision | None
+    """The fault that `comparison` names, and its candidates."""
 
     def without_name(self, why_not: str) -> "Contrast":
-        """The result with its named fault made a candidate; faults that readings, spectra or steps show stay named."""
+        """The result with the fault that `decision` names made a candidate, for the reason `why_not`. Faults that the
+        recordings show directly stay named."""
         if self.decision is None or self.decision.named is None:
             return self
         left = ((self.decision.named, why_not), *self.decision.others)
@@ -50,14 +60,15 @@ class Contrast:
 
     @property
     def left_open(self) -> bool:
-        """Whether the sets differ by more than any two stretches of either do, and no fault explains that."""
+        """Whether faulty and clean recordings differ significantly (`Comparison.differ`), and no fault is named that
+        explains the difference."""
         if self.comparison is None or self.decision is None or self.decision.named is not None:
             return False
         return self.comparison.differ
 
     @property
     def named_effects(self) -> frozenset[str]:
-        """The named effect, and those that cannot be distinguished from it."""
+        """The named effect, and the effects that cannot be distinguished from it; empty where none is named."""
         if self.shown is not None:
             return frozenset(claim.effect.name for claim in self.shown.claims)
         if self.line is not None:
@@ -67,11 +78,13 @@ class Contrast:
         return frozenset({self.decision.named.fault.effect, *self.decision.alike})
 
     def contradicts(self, names: frozenset[str], explained: bool) -> bool:
-        """Whether it contradicts the result of a search by simulation on the same recordings. names: the effects that
-        the search names, with their classes; explained: whether their residual is noise.
+        """Whether this comparison contradicts the result of a search by simulation on the same recordings. names: the
+        effects that the search names, with those that it cannot distinguish from them; explained: whether the search's
+        residual is noise.
 
-        A search with a larger residual may have replaced one unknown effect by several; and where the sets do not
-        differ significantly, an effect that the comparison tested only corrects the model.
+        A named fault contradicts a search that does not name it, unless the residual is noise: a search with a larger
+        residual may have replaced one unknown effect by several. Where the sets do not differ significantly, an effect
+        that both the search names and the comparison tested only corrects the model.
         """
         if self.named_effects:
             return not (explained or names & self.named_effects)
@@ -80,15 +93,15 @@ class Contrast:
 
     @property
     def tested_effects(self) -> frozenset[str]:
-        """Effects that the comparison tested."""
+        """Effects that the comparison tested; empty without a comparison."""
         return frozenset(() if self.comparison is None else (each.fault.effect for each in self.comparison.faults))
 
 
 def contrast_of(
     recordings: Sequence[Recording], clean: Sequence[Recording], without: frozenset[str], time_left: TimeBudget
 ) -> Contrast:
-    """The difference between recordings and clean ones: first a fault that readings, a spectrum or steps show directly,
-    else the comparison of all faults by base models. without: effects that are not considered."""
+    """The difference between recordings and clean ones: the first fault that the recordings show directly, else the
+    comparison of all faults by base models. without: names of effects that are not considered."""
     effects = [effect for effect in CATALOGUE if effect.name not in without]
     shown = find_sensor_faults(recordings, clean, effects)
     if shown:
@@ -105,13 +118,15 @@ def contrast_of(
 
 
 def predicts_clean(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
-    """Whether the model as it is predicts every clean recording with an error of at most `LARGEST_CLEAN_ERROR`."""
+    """Whether the model, without re-tuning, predicts every clean recording with a relative error of at most
+    `LARGEST_CLEAN_ERROR`."""
     errors = [prediction_error(recording, model, "all").without_gain for recording in clean]
     return all(error is not None and error <= LARGEST_CLEAN_ERROR for error in errors)
 
 
 def noise_is_from_repeats(chosen: MeasureChoice) -> bool:
-    """Whether a free simulation is compared, and its noise is known from what repeats."""
+    """Whether the error measure is a free simulation, and its noise was estimated from repeats in every record and is
+    at most `NOISY` times the standard deviation of each channel."""
     size = np.nanstd(np.vstack([record.measured for record in chosen.measure.records]), axis=0)
     repeats = all(floor.how == "repeats" for floor in chosen.floors)
     return repeats and bool(np.all(chosen.measure.noise <= NOISY * size)) and chosen.measure.name == "free simulation"

@@ -1,6 +1,7 @@
-"""Finds sensor faults without a model: quantized readings, clipped readings, repeated readings (lost samples).
+"""Detection of sensor faults without a model: quantization, clipping (saturation), lost samples (repeated readings).
 
-Reference recordings of the device without the fault give the usual frequency of each.
+A healthy device also repeats readings and has a largest one. Reference recordings of the device without the fault
+therefore give the usual count of such readings, which a fault must exceed significantly (`_unusual`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,22 +17,24 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 ALIKE = 1e-3
-"""Relative difference of the steps of two channels up to which they count as the same."""
+"""Relative difference of the quantization steps of two channels up to which they count as equal."""
 LONG_RUNS = 2.0
-"""Largest mean length of runs of repeats, as with half of all samples lost: longer runs are backlash, or a sensor at
-rest."""
+"""Largest mean length in samples of runs of repeats that are taken for lost samples, as with half of all samples lost
+at random: longer runs are backlash, or a sensor at rest."""
 CATCHES_UP = 0.75
-"""Least step after a repeat, relative to the median step: after backlash it is half of that or less."""
+"""Least median step after a repeat, relative to the median of the other steps: after backlash it is half of that or
+less."""
 STRETCHES = 3
-"""Stretches of each reference recording: a frequency that occurs in any of them is usual."""
+"""Number of stretches into which each reference recording is divided: the largest share of any stretch is usual."""
 SAME = 1e-9
-"""Largest relative difference of readings at a limit."""
+"""Relative difference up to which readings count as equal to a limit."""
 
 
 def find_sensor_faults(
     recordings: Sequence[Recording], clean: Sequence[Recording], effects: Sequence[Effect]
 ) -> tuple[Hypothesis, ...]:
-    """Find faulty readings: at most one hypothesis, because rounded readings also repeat and have a largest value.
+    """The first fault of quantization, clipping and lost samples that is found: at most one hypothesis, because
+    quantized readings also repeat and accumulate at the largest value. clean: reference recordings, at least one;
     effects: those that may be named."""
     known = {effect.name: effect for effect in effects}
     new = _readings(recordings)
@@ -54,17 +57,19 @@ Found = tuple[tuple[int, ...], Values]
 
 
 def _hypothesis_of(effect: Effect, channels: tuple[int, ...], values: Values) -> Hypothesis:
+    """The hypothesis that these channels have the fault, with the same values."""
     spread: Spread = "all" if len(channels) > 1 else "one"
     return hypothesis_of_claim(Claim(effect, spread, channels), [values])
 
 
 def _readings(recordings: Sequence[Recording]) -> FloatArray:
-    """(n, p): the readings without missing ones, recordings one after another."""
+    """(n, p): responses of all recordings, one after another, without samples in which a channel is missing."""
     samples = np.vstack([recording.response.samples for recording in recordings])
     return np.asarray(samples[np.isfinite(samples).all(axis=1)])
 
 
 def _quantization(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
+    """Quantization: readings lie on a lattice whose step is more than `STEP_FACTOR` times that of every reference."""
     found = {}
     for c in range(new.shape[1]):
         step = lattice_step(new[:, c])
@@ -77,7 +82,8 @@ def _quantization(new: FloatArray, references: Sequence[FloatArray]) -> Found | 
 
 
 def _find_clipping(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
-    """Clipping: more readings at the largest magnitude than the references have, which exceed that magnitude."""
+    """Clipping: significantly more readings at the largest magnitude than in the references, which exceed that
+    magnitude, and no more repeats below it than usual."""
     found = {}
     for c in range(new.shape[1]):
         limit, count = _top_readings(new[:, c])
@@ -91,13 +97,15 @@ def _find_clipping(new: FloatArray, references: Sequence[FloatArray]) -> Found |
 
 
 def _repeats_below_top(values: FloatArray) -> int:
-    """Number of repeats below the largest magnitude: backlash holds readings at any level, a limit does not."""
+    """Number of repeated readings below the largest magnitude of one channel: backlash holds readings at any level,
+    clipping at the limit only."""
     sizes = np.abs(values[1:])
     return int(np.count_nonzero((np.diff(values) == 0) & (sizes < sizes.max() * (1 - SAME))))
 
 
 def _top_readings(values: FloatArray) -> tuple[float, int]:
-    """The largest magnitude, and the number of readings there less the number at the next magnitude."""
+    """The largest magnitude of one channel, and the number of readings there less the number at the next smaller
+    magnitude."""
     sizes = np.abs(values)
     limit = float(sizes.max())
     there = sizes >= limit * (1 - SAME)
@@ -107,7 +115,8 @@ def _top_readings(values: FloatArray) -> tuple[float, int]:
 
 
 def _lost_samples(new: FloatArray, references: Sequence[FloatArray]) -> Found | None:
-    """Lost samples: scattered repeats. A sensor that rests for a while has not lost samples."""
+    """Lost samples: significantly more runs of repeats than in the references, short and followed by a full step. The
+    parameter is the share of lost samples. A sensor that rests for a while has not lost samples."""
     repeated = _repeats(new)
     usual = max(float(_run_starts(_repeats(readings)).mean()) for readings in references) * len(repeated)
     begun = int(_run_starts(repeated).sum())
@@ -118,8 +127,8 @@ def _lost_samples(new: FloatArray, references: Sequence[FloatArray]) -> Found | 
 
 
 def _catches_up(values: FloatArray, repeated: Mask) -> bool:
-    """Whether the step after a repeat is about as large as others, as after lost samples, and not small as after
-    backlash."""
+    """Whether the median step after a repeat is about as large as the other steps, as after lost samples; after
+    backlash it is smaller."""
     sizes = np.abs(np.diff(values, axis=0)).sum(axis=1)[1:]
     after = repeated[:-1] & ~repeated[1:]
     other = ~repeated[:-1] & ~repeated[1:]
@@ -127,15 +136,18 @@ def _catches_up(values: FloatArray, repeated: Mask) -> bool:
 
 
 def _repeats(values: FloatArray) -> Mask:
+    """(n - 1,): whether all channels repeat the reading before."""
     return np.asarray((np.diff(values, axis=0) == 0).all(axis=1), dtype=np.bool_)
 
 
 def _run_starts(repeated: Mask) -> Mask:
-    """Mask of the first repeat of each run."""
+    """(n - 1,): mask of the first repeat of each run."""
     return np.asarray(repeated & ~np.concatenate([[False], repeated[:-1]]), dtype=np.bool_)
 
 
 def _unusual(count: int, usual: float) -> bool:
+    """Whether a count exceeds the usual one by a factor and by several standard deviations of a Poisson count,
+    sqrt(usual)."""
     return (
         count >= READINGS_LEAST
         and count > READINGS_FACTOR * usual
@@ -144,7 +156,8 @@ def _unusual(count: int, usual: float) -> bool:
 
 
 def _choose_channels(found: Mapping[int, float], everywhere: bool, width: int, name: str) -> Found | None:
-    """The channels with the fault: all, or the one with the largest number. found: number by channel."""
+    """The channels with the fault: all, or only the one with the largest parameter. found: parameter by channel;
+    everywhere: whether all channels have the fault; name: name of the parameter."""
     if not found:
         return None
     most = max(found, key=lambda channel: found[channel])

@@ -1,4 +1,9 @@
-"""Implausible results of a fit, such as negative damping, one sentence each."""
+"""Checks whether the results of a diagnosis are physically plausible; one sentence for the report per doubt.
+
+Doubts are: a parameter at the bound of its fit, static friction below Coulomb friction, a confidence interval that
+contains the value without the effect, and negative damping or stiffness of the improved model (not passive, or
+unstable).
+"""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,13 +19,13 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _AT_THE_EDGE = 1e-3
-"""Relative distance from a bound at which a parameter counts as being at it."""
+"""Relative distance from a bound within which a parameter counts as at that bound."""
 _LOSSES = 1e-6
-"""Negative eigenvalue of a matrix that rounding may cause, over the largest."""
+"""Magnitude of a negative eigenvalue that rounding may cause, relative to the largest eigenvalue."""
 
 
 def implausible_sentences(found: Findings) -> tuple[str, ...]:
-    """Sentences on implausible parameters of the effects, on their intervals, and on the improved model."""
+    """Sentences on implausible parameters of the named effects, on their intervals, and on the improved model."""
     return (
         *(sentence for placed in found.named for sentence in _effect_doubts(placed, found)),
         *(sentence for effect in found.diagnosis.effects for sentence in _interval_doubts(effect, found.named)),
@@ -29,6 +34,7 @@ def implausible_sentences(found: Findings) -> tuple[str, ...]:
 
 
 def _effect_doubts(placed: PlacedEffect, found: Findings) -> Iterator[str]:
+    """Sentences on fitted parameters at a bound, and on friction that is smaller at rest than in motion."""
     noun, values = noun_of(placed.effect.name), placed.values
     for parameter in placed.effect.parameters:
         value = values[parameter.name]
@@ -43,11 +49,14 @@ def _effect_doubts(placed: PlacedEffect, found: Findings) -> Iterator[str]:
 
 
 def _is_at_bound(value: float, parameter: Parameter) -> bool:
+    """Whether a parameter is at a bound of its fit. A bound of 0 is not checked, nor one at which the effect
+    vanishes."""
     edges = [edge for edge in (parameter.lower, parameter.upper) if edge != parameter.none]
     return any(np.isclose(value, edge, rtol=_AT_THE_EDGE, atol=0.0) for edge in edges if edge)
 
 
 def _interval_doubts(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iterator[str]:
+    """A sentence where the 95 % interval of an effect's main parameter contains the value without the effect."""
     placed = next((placed for placed in named if placed.effect.name == effect.effect), None)
     for parameter in placed.effect.parameters[:1] if placed is not None else ():
         estimate = effect.parameters.get(parameter.name)
@@ -60,6 +69,7 @@ def _interval_doubts(effect: NamedEffect, named: Sequence[PlacedEffect]) -> Iter
 
 
 def _model_doubts(improved: MechanicalModel) -> Iterator[str]:
+    """Sentences on a damping or stiffness matrix with a negative eigenvalue beyond rounding."""
     for name, matrix in (("damping", improved.damping), ("stiffness", improved.stiffness)):
         lowest, largest = _ends(matrix)
         if lowest < -_LOSSES * max(largest, 1e-300):
@@ -68,11 +78,13 @@ def _model_doubts(improved: MechanicalModel) -> Iterator[str]:
 
 
 def _ends(matrix: FloatArray) -> tuple[float, float]:
+    """Lowest eigenvalue, and largest magnitude of an eigenvalue, of the symmetric part of a matrix."""
     values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
     return float(values[0]), float(np.abs(values).max())
 
 
 def _unit(effect: str, parameter: str, found: Findings) -> str:
+    """Unit of an effect's parameter in the given model's unit system; "1" where it is not in the vocabulary."""
     known = EFFECTS_BY_NAME.get(effect)
     for known_parameter in known.parameters if known else ():
         if known_parameter.name == parameter:

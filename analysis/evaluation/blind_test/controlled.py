@@ -1,4 +1,9 @@
-"""Controls of a diagnosis: claims about its answers when its input is changed."""
+"""Controls of the blind test: claims about the answers of a diagnosis to inputs that were changed in a known way.
+
+A recording that is shuffled or silent must give no named effect (negative control); a recording that is mirrored, or
+whose axes are exchanged, must give the corresponding answer. A claim is a predicate on the answers to a control's
+inputs (`CLAIMS`); `study.evaluation.challenge.controls` makes these inputs.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,9 +11,10 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Diagnosis
 
 CONFIDENT = 0.5
-"""A probability from which a name is a confident one."""
+"""Least probability of an effect that counts as named."""
 SAME_NUMBER = 0.02
-"""Largest relative difference of parameters, their sign apart, between answers to mirrored recordings."""
+"""Largest difference between the magnitudes of a parameter in the answers to a recording and to its mirror image,
+relative to the first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,25 +25,29 @@ class ControlOutcome:
     claim: str
     held: bool
     said: tuple[str, ...]
-    """Each answer in words; the field of this name in the proof's JSON."""
+    """Each answer in words; written to the proof's JSON under this name."""
 
 
 def judge_control(name: str, claim: str, answers: Sequence[Diagnosis | None]) -> ControlOutcome:
-    """Judge a claim on answers; None = refused or failed, which names nothing. Raises KeyError for an unknown claim."""
+    """Judge a claim on the answers, in the order of the control's inputs. None = the diagnosis refused or failed.
+    Raises KeyError for a claim that `CLAIMS` lacks."""
     return ControlOutcome(name, claim, CLAIMS[claim](answers), tuple(map(_answer_text, answers)))
 
 
 def _names_nothing(answers: Sequence[Diagnosis | None]) -> bool:
+    """No effect has a probability of `CONFIDENT` or more; a refusal names nothing."""
     return not any(
         effect.probability >= CONFIDENT for answer in answers if answer is not None for effect in answer.effects
     )
 
 
 def _not_explained(answers: Sequence[Diagnosis | None]) -> bool:
+    """No answer has the verdict "explained"; a refusal explains nothing."""
     return all(answer is None or answer.verdict != "explained" for answer in answers)
 
 
 def _no_mismatch(answers: Sequence[Diagnosis | None]) -> bool:
+    """Every answer finds no mismatch, or only parameters that differ; a refusal does not count."""
     return all(answer is not None and answer.verdict in ("no_mismatch", "parameters") for answer in answers)
 
 
@@ -48,12 +58,13 @@ def _same_answers(answers: Sequence[Diagnosis | None]) -> bool:
 
 
 def _same_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
+    """The same verdict and effects, and at least one effect; axes may differ."""
     distinct = {_verdict_and_effects(answer, with_axes=False) for answer in answers if answer is not None}
     return len(distinct) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
 
 
 def _axis_exchanged(answers: Sequence[Diagnosis | None]) -> bool:
-    """The same effects, each at the other axis."""
+    """Two answers with the same verdict and effects, each effect on a different axis."""
     if not _same_but_axes(answers):
         return False
     first, second = ([effect.axis for effect in answer.effects] for answer in answers if answer is not None)
@@ -61,7 +72,8 @@ def _axis_exchanged(answers: Sequence[Diagnosis | None]) -> bool:
 
 
 def _opposite_sign(answers: Sequence[Diagnosis | None]) -> bool:
-    """One effect, its main number with the other sign."""
+    """Two answers with the same effects and axes; the first parameter of the first effect has the same magnitude
+    (`SAME_NUMBER`) and the opposite sign."""
     mains = [next(iter(answer.effects[0].parameters.values())).value for answer in answers if answer and answer.effects]
     if len(mains) != len(answers) or not _same_answers(answers):
         return False
@@ -88,3 +100,4 @@ CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {
     "axis exchanged": _axis_exchanged,
     "opposite": _opposite_sign,
 }
+"""Predicate on the answers, by the name of the claim."""

@@ -1,4 +1,10 @@
-"""Score of a bank's outcomes: figures with their intervals."""
+"""Score of a blind test: from the outcomes of a bank of cases, rates and medians with their 95 % intervals.
+
+Detection and naming of single effects and of pairs, false alarms on devices without a missing effect, behaviour where
+the true effect is outside the catalogue (open set), and error and interval coverage of the parameters. Cases count only
+where the mismatch is detectable (`outcome.DETECTABLE`), except where a figure says otherwise. Intervals:
+`confidence_intervals`.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,12 +20,13 @@ from analysis.evaluation.blind_test.outcome import Concealed, Outcome
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 TURN = 2 * math.pi
-"""A full turn (rad), by which phases may differ."""
+"""A full turn (rad): phases that differ by whole turns are equal."""
 
 
 def nearest_true_value(name: str, estimate: float, values: Mapping[str, float]) -> float:
-    """The true value of a parameter; where other values act the same, that nearest to the stated one. values: all true
-    ones of the effect.
+    """True value of a parameter, for comparison with its estimate: of equivalent values (a phase modulo a full turn,
+    the position of either of two equal end stops), that nearest to the estimate. values: all true parameters of the
+    effect.
     """
     true = values[name]
     if name == "phase":
@@ -30,11 +37,13 @@ def nearest_true_value(name: str, estimate: float, values: Mapping[str, float]) 
 
 
 NOT_EXPLAINED = ("unexplained", "partly_explained")
+"""Verdicts that admit a mismatch without an explanation: right where the true effect is outside the catalogue."""
 
 
 def is_miss(outcome: Outcome) -> bool:
-    """Whether an answer counts as a miss: a wrong name always does, even where nothing was detectable; where the true
-    effect is excluded, any name does."""
+    """Whether an answer is wrong. A failed diagnosis and a wrong name always count, even where nothing was detectable.
+    For a detectable effect, so do a missing name, a wrong axis and, outside the catalogue, a verdict that claims to
+    explain it. Where the true effect was excluded from the catalogue, any name is wrong."""
     if outcome.diagnosis is None or has_wrong_name(outcome):
         return True
     if outcome.kind in ("nothing", "without") or not outcome.detectable:
@@ -45,13 +54,14 @@ def is_miss(outcome: Outcome) -> bool:
 
 
 def has_wrong_name(outcome: Outcome) -> bool:
-    """An effect is named that is not there, or that was not to be considered."""
+    """Whether an effect is named that is not concealed in the case, or any effect where the true effect was excluded
+    from the catalogue."""
     there = () if outcome.kind in ("nothing", "without") else outcome.names
     return not set(outcome.named_names) <= set(there)
 
 
 def is_on_other_axis(outcome: Outcome) -> bool:
-    """A right name, but at an axis where nothing is concealed; of devices with several."""
+    """Whether a concealed effect is named at another axis than its own, on a device with several axes."""
     if len(outcome.axes) < 2:
         return False
     true = {each.effect: each.axis for each in outcome.concealed}
@@ -62,6 +72,7 @@ def is_on_other_axis(outcome: Outcome) -> bool:
 
 
 BANKS = ("main", "dirty", "engine")
+"""Banks of cases; see `outcome.Outcome.bank`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +82,11 @@ class Score:
     figures: tuple[Figure, ...]
     calibration: Calibration
     misses: tuple[Outcome, ...]
-    """Wrong answers; a missing name for something undetectable is not wrong."""
+    """Outcomes with a wrong answer (`is_miss`); a missing name for an undetectable effect is not wrong."""
 
 
 def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Score:
-    """Score of a bank's outcomes. followed: outcomes of ambiguous answers after a further recording."""
+    """Score of a bank's outcomes. followed: ambiguous answers that were diagnosed again with a further recording."""
     figures = (
         *_single_figures(outcomes), *_null_figures(outcomes), *_open_set_figures(outcomes), *_pair_figures(outcomes),
         *follow_up_figures(followed), *_number_figures(outcomes),
@@ -84,6 +95,7 @@ def score(outcomes: Sequence[Outcome], followed: Sequence[FollowUp] = ()) -> Sco
 
 
 def _select_kind(outcomes: Sequence[Outcome], kind: str, bank: str = "") -> list[Outcome]:
+    """Outcomes of cases of this kind; bank: of that bank only, unless empty."""
     return [outcome for outcome in outcomes if outcome.kind == kind and (not bank or outcome.bank == bank)]
 
 
@@ -92,6 +104,7 @@ def _select_detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
 
 
 def _single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    """Figures on cases with a single concealed effect: its name, place and axis, and the returned set of names."""
     words = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
         seen = _select_detectable(_select_kind(outcomes, "single", bank))
@@ -115,12 +128,14 @@ def _single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
 
 
 def _null_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    """False alarms on cases without a concealed effect."""
     yield share("nothing missing, yet named", _select_kind(outcomes, "nothing"), lambda each: bool(each.named))
     clean = _select_kind(outcomes, "nothing")
     yield share("nothing missing, and said so", clean, lambda each: each.verdict in ("no_mismatch", "parameters"))
 
 
 def _open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    """Figures on cases whose true effect is outside the catalogue, or was excluded from it."""
     outside = _select_detectable(_select_kind(outcomes, "outside"))
     yield share("outside the catalogue, not explained", outside, lambda each: each.verdict in NOT_EXPLAINED)
     yield share("outside the catalogue, no name at all", outside, lambda each: not each.named)
@@ -130,12 +145,14 @@ def _open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
 
 
 def _pair_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    """Figures on cases with two concealed effects."""
     pairs = _select_detectable(_select_kind(outcomes, "pair"))
     yield share("pairs, both and no other", pairs, lambda each: each.right)
     yield share("pairs, at least one", pairs, lambda each: bool(set(each.names) & set(each.named_names)))
 
 
 def _number_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+    """Parameter errors and interval coverage of single effects named right, the remaining error, and run times."""
     right = [each for each in _select_detectable(_select_kind(outcomes, "single")) if each.right]
     errors = [main_error(each.concealed[0], each.named[0]) for each in right]
     yield statistic("main parameter's error, median", [e for e in errors if e is not None], np.median)
@@ -153,7 +170,7 @@ def _number_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
 
 
 def main_error(true: Concealed, named: NamedEffect) -> float | None:
-    """Relative; None where the label holds no such number."""
+    """Relative error of the estimate of an effect's main parameter; None where its true value is unknown or 0."""
     name = EFFECTS_BY_NAME[true.effect].main.name
     if not true.values.get(name):
         return None
@@ -163,7 +180,7 @@ def main_error(true: Concealed, named: NamedEffect) -> float | None:
 
 
 def interval_coverage(true: Concealed, named: NamedEffect) -> dict[str, bool]:
-    """Whether the interval holds the true value, of every parameter that has both."""
+    """By parameter, whether its 95 % interval contains the true value; only parameters that have both."""
     found = {}
     for name, estimate in named.parameters.items():
         if estimate.ci95 is not None and name in true.values:
@@ -173,6 +190,6 @@ def interval_coverage(true: Concealed, named: NamedEffect) -> dict[str, bool]:
 
 
 def is_main_covered(true: Concealed, named: NamedEffect) -> bool:
-    """Whether the 95 % interval of the effect's main parameter holds the true value. Raises KeyError where either is
-    missing."""
+    """Whether the 95 % interval of the effect's main parameter contains the true value. Raises KeyError where the
+    interval or the true value is missing."""
     return interval_coverage(true, named)[EFFECTS_BY_NAME[true.effect].main.name]

@@ -1,4 +1,4 @@
-"""Words for the results of a blind test: a share with its interval, what was concealed, what was answered."""
+"""Texts for reports of a blind test: a share with its confidence interval, the concealed effects, the answer."""
 
 from analysis.evaluation.blind_test.confidence_intervals import Figure
 from analysis.evaluation.blind_test.outcome import Outcome

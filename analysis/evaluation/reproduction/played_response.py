@@ -1,4 +1,9 @@
-"""Response of a device from wanted to delivered acceleration, line by line (the published figure 5)."""
+"""Frequency response of a device from wanted to delivered acceleration, for the reproduction of the published figure 5.
+
+T(f) is the ratio of the spectra of one steady period, line by line; column i belongs to a signal wanted along axis i.
+T is the identity matrix for a perfect equalizer. `equalizer.tracking.feedforward.quality` defines flatness, coupling
+and axis error.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,31 +22,37 @@ SignalKind = Literal["sweep", "multisine"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedResponse:
-    """Delivered over wanted, column by column the wanted axis; 1 on the diagonal is perfect."""
+    """Measured response from wanted to delivered acceleration, with the conditions of its measurement."""
 
     name: str
     device: str
     place_m: tuple[float, float, float]
+    """Place of the handle in the workspace: x, y, z in m."""
     hand: bool
+    """Whether a simulated hand held the handle."""
     signal: SignalKind
     frequency_hz: FloatArray
     """(lines,)"""
     response: ComplexArray
-    """(lines, axes, axes)"""
+    """(lines, axes, axes): T, delivered over wanted; the last index is the wanted axis."""
     peak_force_n: float
+    """Largest magnitude of the commanded force vector."""
     clipped_ticks: int
+    """Number of ticks of the device loop at which a cap cut the force."""
     multiply_adds: int | None = None
+    """Multiply-adds per sample of the inverse that computes the forces; None where they are not counted."""
 
 
 def make_wanted_wave(
     kind: SignalKind, band_hz: tuple[float, float], period: int, sample_rate_hz: float, seed: int
 ) -> FloatArray:
-    """A period (period,) of the wanted signal, with a peak of 1 and nothing outside the band."""
+    """One period (period,) of the wanted signal, with a peak of 1 and without power outside the band. kind: logarithmic
+    sweep or multisine. seed: of the multisine's phases."""
     low, high = band_hz
     if kind == "multisine":
         lines = lines_between(low, high, period, sample_rate_hz, odd_only=False)
         return multisines(lines, period, 1.0, 1, 1, seed)[0][:, 0]
-    # A little wider than the band, so that the band's ends are not where the sweep turns.
+    # Slightly wider than the band, so that the ends of the band lie inside the sweep, not at its jump back.
     spectrum = np.fft.rfft(log_sweep(0.9 * low, 1.06 * high, 1.0, period, sample_rate_hz))
     spectrum[~lines_of_band(band_hz, period, sample_rate_hz)] = 0
     wave = np.fft.irfft(spectrum, period)
@@ -52,7 +63,7 @@ def make_wanted_wave(
 def lines_of_band(
     band_hz: tuple[float, float], period: int, sample_rate_hz: float
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(period // 2 + 1,)"""
+    """(period // 2 + 1,): whether each line of the real FFT of a period lies within the band."""
     frequency_hz = np.fft.rfftfreq(period, 1 / sample_rate_hz)
     return np.asarray((frequency_hz >= band_hz[0] - 1e-9) & (frequency_hz <= band_hz[1] + 1e-9))
 
@@ -60,8 +71,8 @@ def lines_of_band(
 def estimate_response(
     wanted: FloatArray, delivered: Sequence[FloatArray], band_hz: tuple[float, float], sample_rate_hz: float
 ) -> tuple[FloatArray, ComplexArray]:
-    """Frequencies (lines,) and response (lines, axes, axes), delivered over wanted. wanted: (axes, period), a wave for
-    each axis in turn; delivered: for each of them a whole steady period, (period, axes)."""
+    """Frequencies in Hz (lines,) and response (lines, axes, axes), delivered over wanted. wanted: (axes, period), the
+    signal of each axis, played one axis at a time. delivered: for each of these, one steady period (period, axes)."""
     period = wanted.shape[1]
     used = lines_of_band(band_hz, period, sample_rate_hz)
     columns = [
@@ -73,14 +84,15 @@ def estimate_response(
 
 
 def normalise_gain(response: ComplexArray) -> ComplexArray:
-    """The response divided by its mean gain along the axes, which a static gain would correct."""
+    """The response divided by the geometric mean of its diagonal gains over all lines and axes, an error that a static
+    gain would correct."""
     along = np.abs(np.einsum("lii->li", response))
     level: ComplexArray = response / np.exp(np.log(along).mean())
     return level
 
 
 def coupling_db(response: ComplexArray) -> FloatArray:
-    """(lines,): the largest off-axis entry over the on-axis entry in dB, of the worst axis."""
+    """(lines,): largest ratio |T_ji| / |T_ii| with j != i in dB, of the worst wanted axis i; at least -240 dB."""
     along = np.abs(np.einsum("lii->li", response))
     off = np.abs(response) * (1 - np.eye(response.shape[1]))
     ratio: FloatArray = 20 * np.log10(np.maximum((off.max(axis=1) / along).max(axis=1), 1e-12))
@@ -88,8 +100,8 @@ def coupling_db(response: ComplexArray) -> FloatArray:
 
 
 def describe_played(played: PlayedResponse) -> PlayedRow:
-    """The response's figures of merit as a row of the document. error: rms departure from the identity matrix, per
-    axis."""
+    """The response's figures of merit as a row of the document. Its `error` is the rms over lines of the Frobenius norm
+    of T - I, divided by the root of the number of axes."""
     found = measure_quality(played.response)
     axes = played.response.shape[1]
     error = np.sqrt((np.abs(played.response - np.eye(axes)) ** 2).sum() / (axes * len(played.response)))

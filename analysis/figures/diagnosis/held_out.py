@@ -1,4 +1,9 @@
-"""Figure of held-out data: an excerpt in which the effect shows, measured and predicted, and all channels' errors."""
+"""Figure of the prediction of held-out data by three models: as given, re-tuned, and with the effects found.
+
+Left: an excerpt of a channel, measured and predicted, with the residuals. It is chosen automatically, where the effects
+change the prediction most in units of the noise. Right: rms errors of all channels over all held-out samples, over the
+noise.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,21 +20,24 @@ from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, p
 from equalizer.signals.signal import FloatArray
 
 _CYCLES = 5.0
-"""Cycles of the effect's change in the excerpt."""
+"""Length of the excerpt in cycles of the change that the effects make to the prediction."""
 _SHORTEST_S, _LONGEST_S = 0.1, 3.0
-"""Shortest and longest stretch that is drawn."""
+"""Bounds of the excerpt's length (s)."""
 _MARKERS = {"before": "s", "retuned": "D", "after": "o"}
+"""Marker of each stage."""
 _STRETCHES = 60
-"""Number of stretches from which the drawn one is chosen."""
+"""Number of candidate excerpts per held-out stretch, evenly spaced."""
 _STANDING = 0.01
-"""Weight of a constant change beside a varying one, when a stretch is chosen."""
+"""Weight of the mean square of a change against its variance in the choice of the excerpt (`_visibility`)."""
 
 ChannelErrors = Mapping[str, Mapping[str, float]]
+"""Rms error over the noise's rms, by stage ("before", "retuned", "after"), then by channel."""
 
 
 @dataclass(frozen=True, slots=True)
 class Excerpt:
-    """A stretch of a channel of a time series: samples `start` to `stop`."""
+    """An excerpt of one channel of a time series: samples `start` to `stop`, exclusive. channel: index in
+    `TimeSeries.channels`."""
 
     series: TimeSeries
     channel: int
@@ -40,7 +48,7 @@ class Excerpt:
 def held_out_picture(
     time_series: Sequence[TimeSeries], noise_rms: Mapping[str, float], errors: ChannelErrors
 ) -> Picture:
-    """Figure of held-out samples with the predictions. errors: by stage and channel, in units of the noise."""
+    """The figure with title, caption and alternative text. noise_rms: by channel, in the channel's SI unit."""
     excerpt = find_excerpt(time_series, noise_rms)
     where = ""
     if excerpt is not None:
@@ -59,8 +67,8 @@ def held_out_picture(
 
 
 def find_excerpt(time_series: Sequence[TimeSeries], noise_rms: Mapping[str, float]) -> Excerpt | None:
-    """The held-out excerpt and channel where re-tuned and final prediction differ most, in units of the noise; where
-    they do not differ, those where given and final do. None without a difference."""
+    """The held-out excerpt and channel where the re-tuned and the final prediction differ most, in units of the noise;
+    where these do not differ visibly, where the given and the final do. None where neither pair differs."""
     for each in ("retuned", "before"):
         best: tuple[float, Excerpt] | None = None
         for series in time_series:
@@ -70,12 +78,15 @@ def find_excerpt(time_series: Sequence[TimeSeries], noise_rms: Mapping[str, floa
                 found = _strongest_excerpt(series, change[start:stop], start)
                 if found is not None and (best is None or found[0] > best[0]):
                     best = found
+        # A change counts as visible where `_visibility` is above a tenth of the noise's variance.
         if best is not None and best[0] > 0.1:
             return best[1]
     return None
 
 
 def _strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) -> tuple[float, Excerpt] | None:
+    """Visibility and excerpt of the part of a held-out stretch in which the change is most visible; None without a
+    change. change: (n, channels), in units of the noise; start: index of its first sample."""
     if not len(change):
         return None
     channel = int(np.argmax(_visibility(change)))
@@ -83,7 +94,7 @@ def _strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) -> tu
     rms, speed = float(np.std(signal)), float(np.sqrt(np.mean(np.diff(signal, prepend=signal[0]) ** 2)))
     if not signal.any():
         return None
-    # The frequency at which a sine of this size would change as fast.
+    # Period of a sine with the same rms and the same rms slope: 2 pi rms(x) / rms(dx/dt).
     cycle_s = 2 * np.pi * rms / max(speed * series.sample_rate_hz, 1e-12)
     length = int(np.clip(_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * series.sample_rate_hz)
     length = min(max(length, 8), len(signal))
@@ -94,13 +105,14 @@ def _strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) -> tu
 
 
 def _visibility(change: FloatArray) -> FloatArray:
-    """Weight of a change for the excerpt: its variance, and little of its mean square, because motion shows more."""
+    """Visibility of a change, (channels,) or a number: its variance plus `_STANDING` times its squared mean, because a
+    varying change is easier to see in a plot than an offset."""
     return np.asarray(np.var(change, axis=0) + _STANDING * np.mean(change, axis=0) ** 2)
 
 
 def draw_held_out(excerpt: Excerpt | None, noise_rms: Mapping[str, float], errors: ChannelErrors) -> Figure:
-    """Figure of an excerpt, measured and predicted, beside the errors of all channels; only the errors where `excerpt`
-    is None."""
+    """Figure of an excerpt, measured and predicted, and of the errors of all channels to its right; only the errors
+    where `excerpt` is None, and a note where there are none either."""
     channels = list(next(iter(errors.values()), {}))
     if excerpt is None and not channels:
         return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
@@ -119,13 +131,14 @@ def draw_held_out(excerpt: Excerpt | None, noise_rms: Mapping[str, float], error
 
 
 def _draw_excerpt(above: Axes, below: Axes, excerpt: Excerpt, noise_rms: Mapping[str, float]) -> None:
+    """Draw the measured and predicted channel above, and the residuals over twice the noise's rms below."""
     series, part, k = excerpt.series, slice(excerpt.start, excerpt.stop), excerpt.channel
     name, unit = series.channels[k], series.units[k]
     seconds = np.arange(excerpt.start, excerpt.stop) / series.sample_rate_hz
     measured = series.measured[part, k]
     shown = scale_of(unit, float(np.max(np.abs(measured))))
     left = [(stage, measured - getattr(series, stage.name)[part, k]) for stage in STAGES]
-    # The given model may be so far off that it would flatten the others.
+    # The residual of the given model does not set the scale: it may be so large that the others would look flat.
     largest = max(float(np.max(np.abs(each))) for stage, each in left if stage is not BEFORE)
     small = scale_of(unit, largest)
     above.plot(seconds, shown.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
@@ -146,6 +159,7 @@ def _draw_excerpt(above: Axes, below: Axes, excerpt: Excerpt, noise_rms: Mapping
 
 
 def _draw_errors(axes: Axes, errors: ChannelErrors) -> None:
+    """Draw the rms error of each channel (rows) over its noise, on a logarithmic axis, for each stage."""
     plain_axes(axes)
     channels = list(next(iter(errors.values())))
     rows = np.arange(len(channels), dtype=float)
@@ -168,12 +182,14 @@ def _draw_errors(axes: Axes, errors: ChannelErrors) -> None:
 
 
 def _draw_stage(axes: Axes, stage: Stage, values: FloatArray, rows: FloatArray) -> None:
+    """Draw the errors of one stage as lines from the noise level (1); stages are offset within a channel's row."""
     at = rows + 0.24 * (STAGES.index(stage) - 1)
     axes.hlines(at, 1.0, values, color=stage.colour, linewidth=1.6, alpha=0.75)
     axes.plot(values, at, _MARKERS[stage.name], color=stage.colour, markersize=5)
 
 
 def _alternative_text(errors: ChannelErrors) -> str:
+    """Description for screen readers: the errors of each stage by channel."""
     sentences = []
     for stage in STAGES:
         if stage.name in errors:

@@ -1,4 +1,8 @@
-"""Figure of a named effect's signature: the residual without it over its variable, with the fitted law."""
+"""Figures of the signatures of named effects: the data that identify an effect, with its fitted law.
+
+A signature is the residual of the model without the effect (or the missing force) against the variable that the effect
+depends on, such as friction against velocity: means per bin with two standard errors.
+"""
 
 from collections.abc import Sequence
 
@@ -16,12 +20,14 @@ from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
 
 _ROUNDED = " A missing force is known only as fast as noise lets it be, so that corners look rounder than they are."
+"""Sentence of the caption where the ordinate is an estimated missing force, whose bandwidth the noise limits."""
 
 _BEYOND = " Shaded: no recording came there; what the formula says there is not known."
+"""Sentence of the caption where the law is drawn beyond the recorded range, as an extrapolation."""
 
 
 def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
-    """A picture for each signature, with caption and alternative text, numbered from 1."""
+    """One picture per signature, with caption and alternative text; names are numbered from 1."""
     return tuple(
         Picture(
             name=f"signature-{number}",
@@ -43,7 +49,8 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
 
 
 def draw_signature(signature: Signature) -> Figure:
-    """Figure of the residual without an effect, means per bin with two standard errors, and the fitted law."""
+    """Figure of one signature: dots with two standard errors, and the fitted law as a line. Spectra have logarithmic
+    axes; the range that was not recorded is shaded. A note where there is no bin."""
     figure = new_figure(8.8, 4.0)
     if not len(signature.measured_at):
         return draw_no_data_note(figure, "Too few samples show this effect to draw it.")
@@ -90,7 +97,8 @@ def _scale_label(text: str, values: FloatArray) -> tuple[str, float]:
 
 
 def _find_visited_limits(signature: Signature, factor: float) -> tuple[float, float]:
-    """Ordinates of what was visited, with as much again as margin: a formula may have a pole beyond."""
+    """Limits of the ordinate from dots and law within the recorded range, with a margin of 0.75 of their span on either
+    side: beyond the range, a formula may have a pole. The signature must have such a range."""
     assert signature.visited is not None
     low, high = signature.visited
     law = signature.law[(signature.law_at >= low) & (signature.law_at <= high)]
@@ -100,6 +108,7 @@ def _find_visited_limits(signature: Signature, factor: float) -> tuple[float, fl
 
 
 def _never_visited(signature: Signature) -> tuple[tuple[float, float], ...]:
+    """Intervals of the abscissa in which the law is drawn but nothing was recorded; empty where these are not known."""
     if signature.visited is None:
         return ()
     low, high = signature.visited
@@ -107,6 +116,7 @@ def _never_visited(signature: Signature) -> tuple[tuple[float, float], ...]:
 
 
 def _alternative_text(signature: Signature) -> str:
+    """Description for screen readers: range of the dots, and rms distance of the law from them."""
     if not len(signature.measured_at) or not len(signature.law_at):
         return ""
     order = np.argsort(signature.law_at)

@@ -1,4 +1,8 @@
-"""Counts of a study's answers by person, frequency, level and direction, the data of the likelihood."""
+"""Counts of a study's answers by person, frequency, level and direction: the data of the hierarchical likelihood.
+
+Trials that agree in all four form a cell; with its numbers of right and wrong answers, a cell enters the binomial
+likelihood of the psychometric function once instead of trial by trial.
+"""
 
 import math
 from collections.abc import Iterable
@@ -11,20 +15,25 @@ from equalizer.signals.signal import FloatArray
 from protocols.trial import Phase, Trial
 
 LEVEL_GRID_DB = 1e-6
-"""Levels closer than this are one level: rounding in a table, far below any step."""
+"""Levels (dB) that round to the same multiple of this count as equal: it absorbs the rounding of a table, and is far
+below any step of a staircase."""
 
 FEWEST_ANSWERS = 20
-"""A person with fewer at a frequency, and with less than half of the most that a person has there, is no independent
-witness of its median; but is where none of their runs, at all frequencies, is so much shorter than their longest."""
+"""A person with at least this many answers at a frequency counts among the people there (`Answers.played`). With fewer
+answers, a person counts if they are at least half of the most that any person has at that frequency, or at least half
+of the person's own longest run, where the person has answers at every frequency. Otherwise the run counts as broken
+off."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answers:
-    """Cells (m,), sorted by run = person * frequencies + frequency. Every person has at least one cell."""
+    """Counts per cell; all arrays are (m,), sorted by run, then level, then direction. Every person has at least one
+    cell."""
 
     subjects: tuple[str, ...]
     frequencies_hz: tuple[float, ...]
     run: NDArray[np.intp]
+    """Index of the run: index of the person times the number of frequencies, plus index of the frequency."""
     level_db: FloatArray
     """Levels in dB re 1 N, or re 1 of the chosen unit."""
     side: FloatArray
@@ -32,9 +41,11 @@ class Answers:
     right: FloatArray
     """Number of correct answers."""
     wrong: FloatArray
+    """Number of wrong answers."""
 
     @property
     def persons(self) -> int:
+        """Number of persons."""
         return len(self.subjects)
 
     @property
@@ -49,11 +60,12 @@ class Answers:
 
     @property
     def played(self) -> NDArray[np.bool_]:
-        """Whether a person has enough answers at a frequency to count among the people there (persons, frequencies)."""
+        """(persons, frequencies): whether a person has enough answers at a frequency to count as an independent
+        observation of the population there; see `FEWEST_ANSWERS`."""
         shape = self.persons, len(self.frequencies_hz)
         trials = np.bincount(self.run, weights=self.right + self.wrong, minlength=math.prod(shape))
         trials = trials.reshape(shape)
-        # Of a person who lacks a frequency the longest run shows nothing: it may be broken off, too.
+        # A person without answers at some frequency stopped early, so that even their longest run may be broken off.
         own = np.where(trials.min(axis=1) > 0, trials.max(axis=1), math.inf)
         most = np.minimum(trials.max(axis=0), own[:, None])
         enough: NDArray[np.bool_] = trials >= np.clip(0.5 * most, 1.0, FEWEST_ANSWERS)
@@ -61,10 +73,11 @@ class Answers:
 
 
 def count_answers(trials: Iterable[Trial], frequencies_hz: Iterable[float]) -> Answers | None:
-    """All answers that count, of the test phase, at these frequencies: nothing is censored, no participant is dropped.
+    """All valid answers (`Trial.counts`) of the test phase at these frequencies; no participant is dropped. None where
+    there is no such answer.
 
-    None where there is no such answer. Answers of an unfinished run count too: where a run stops depends on the answers
-    before, never on the threshold itself.
+    Answers of an unfinished run count too: where a run stops depends on the answers before, not on the threshold
+    itself, so that the stopping rule does not enter the likelihood.
     """
     wanted = tuple(sorted(frequencies_hz))
     rows = [t for t in trials if t.phase is Phase.TEST and t.counts and t.frequency_hz in wanted]
@@ -88,10 +101,10 @@ def tally(
     side: FloatArray,
     right: NDArray[np.bool_],
 ) -> Answers:
-    """Count equal trials together; the arrays have an entry per trial, (trials,)."""
+    """Count the trials of each cell; run, level_db, side and right have an entry per trial, (trials,), at least one."""
     grid = np.round(level_db / LEVEL_GRID_DB).astype(np.int64)
     grid -= grid.min()
-    # Sorted by run, then level, then side: one number per cell is quicker to sort than rows.
+    # One integer key per cell, ordered by run, then level, then side, is quicker to sort than rows of three.
     key = (run.astype(np.int64) * (int(grid.max()) + 1) + grid) * 2 + (side > 0)
     _, first, cell = np.unique(key, return_index=True, return_inverse=True)
     return Answers(

@@ -1,4 +1,8 @@
-"""Goodness of fit: predicted against observed shares of right answers."""
+"""Goodness of fit of the hierarchical psychometric model: predicted against observed shares of right answers.
+
+Trials are binned by their predicted share (calibration plot); per bin, z = (observed - predicted) / standard error,
+with the binomial variance sum of n p (1 - p). Equations of p: `curve`.
+"""
 
 from dataclasses import dataclass
 
@@ -9,14 +13,15 @@ from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from equalizer.signals.signal import FloatArray
 
 BINS = 8
-"""Number of bins of predicted proportions with equal numbers of trials: about 400 trials each in a study of ten."""
+"""Number of bins with equal numbers of trials: about 400 trials each in a study of ten participants."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShareBin:
-    """Predicted and observed share of right answers in a bin of answers with similar predictions."""
+    """Predicted and observed share of right answers in a bin of trials with similar predictions."""
 
     trials: int
+    """Number of trials in the bin."""
     predicted: float
     observed: float
     z: float
@@ -25,9 +30,10 @@ class ShareBin:
 
 @dataclass(frozen=True, slots=True)
 class GoodnessOfFit:
-    """Observed and expected shares in bins. There is no p-value: levels follow answers, and each person's parameters
-    were fitted to them, so the lowest bins come out some standard errors too low although the model is right. Look for
-    departures with a shape."""
+    """Observed and predicted shares in bins. There is no p-value: the staircase sets each level by the answers before,
+    and each person's parameters were fitted to the same answers, so that the observed shares of the lowest bins are
+    some standard errors too low although the model is right. Only a systematic pattern over the bins indicates
+    misfit."""
 
     bins: tuple[ShareBin, ...]
 
@@ -56,7 +62,8 @@ def goodness_of_fit(fit: HierarchicalFit) -> GoodnessOfFit:
 
 
 def predict_shares(fit: HierarchicalFit) -> FloatArray:
-    """Probability of a right answer in each cell (m,), with the person's own threshold, slope and criterion."""
+    """(m,): probability of a right answer in each cell of `fit.answers`, with the person's own threshold, slope and
+    criterion: lapse + (1 - 2 lapse) Phi(q(t) - side criterion), t = t0 + slope ln(10)/20 (level - threshold)."""
     cells, k = fit.answers, fit.layout.k
     person = cells.person
     pace = np.exp(fit.latent[person, k]) * NEPER_PER_DB

@@ -1,16 +1,15 @@
-"""The marginal likelihood of each person by Laplace's method, with its exact gradient.
+"""Marginal likelihood of each person in the hierarchical psychometric model, by Laplace's method, and its gradient.
 
 Population: theta = mean_j + person + person x frequency, both normal; log-slope normal; criterion normal around 0; one
 lapse rate. Its parameters, in this order (`Layout`): the k means in dB, log SD of persons, log SD of person x
-frequency, mean log-slope, log SD of it, log SD of criteria, logit of the lapse rate.
+frequency, mean log-slope, log SD of log-slopes, log SD of criteria, logit of the lapse rate.
 
-Why adaptive levels change nothing: each level follows from the answers before it by a fixed rule. The probability of a
-whole run is then the product of the probabilities of its answers at the levels played, times factors without any
-unknown (ignorable in the sense of D. B. Rubin, Biometrika 63 (1976), 581-592). The same holds at the cap: an answer
-there is an answer at 3 N, neither censored nor less true.
+With the mode z of a person's latent parameters, d = z - centre, prior precision P, expected information J:
+    log marginal = log-likelihood(z) - d' P d / 2 + (ln det P - ln det(P + J)) / 2.
+J replaces the observed curvature, which can vanish at the mode of a run with a lapse: the volume would be infinite.
 
-The volume around each mode is taken from the expected information, not from the observed curvature: a run with a lapse
-at the wrong place can have a mode as flat as a table, where the observed curvature makes the approximation infinite.
+Adaptive levels need no correction: each level follows from the answers before it by a fixed rule, so that the design is
+ignorable (D. B. Rubin, Biometrika 63 (1976), 581-592). Answers at the cap count as answers at that level, uncensored.
 
 Source: L. Tierney, J. B. Kadane, J. Am. Stat. Assoc. 81 (1986), 82-86; the gradient by implicit differentiation of the
 mode: H. J. Skaug, D. A. Fournier, Comput. Stat. Data Anal. 51 (2006), 699-709.
@@ -26,21 +25,24 @@ from analysis.psychophysics.hierarchy.likelihood import Derivatives, TrialLikeli
 from equalizer.signals.signal import FloatArray
 
 NEWTON_STEPS = 60
-"""Most Newton steps to the mode of a person's parameters."""
+"""Maximum number of Newton steps to the mode of a person's latent parameters."""
 SETTLED = 1e-11
-"""Newton decrement of the log-likelihood at which a mode is found: then the gradient is right to some six digits."""
+"""Newton decrement (gradient times step) of the log posterior at which a mode is found; the gradient of the marginal
+likelihood then has some six correct digits."""
 LOWEST_CURVATURE = 1e-5
-"""Least curvature of a Newton step, per dB squared: below it the step length is undetermined. Where people have nothing
-in common, that of a threshold without answers is 1e-3."""
+"""Least eigenvalue of the observed curvature (per dB²) that is used for a Newton step. A prior SD of 30 dB, with no
+answers, has a curvature of 1e-3, well above it."""
 LONGEST_STEP_DB, LONGEST_STEP_SLOPE, LONGEST_STEP_D = 6.0, 0.7, 1.0
-"""Largest Newton step in a threshold, a log-slope and a criterion: the model is not quadratic over larger ones."""
+"""Largest Newton step in a threshold (dB), a log-slope and a criterion (units of d'): over larger steps the log
+posterior is not quadratic."""
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Indices of the population's parameters, for k frequencies."""
+    """Indices of the population's parameters in their vector (k + 6,), for k frequencies."""
 
     k: int
+    """Number of frequencies; the means are parameters 0 to k - 1."""
 
     @property
     def size(self) -> int:
@@ -49,22 +51,23 @@ class Layout:
 
     @property
     def log_sds(self) -> list[int]:
-        """Log standard deviations: of persons, of person x frequency, of log-slopes, of criteria."""
+        """Indices of the log standard deviations: of persons, of person x frequency, of log-slopes, of criteria."""
         return [self.k, self.k + 1, self.k + 3, self.k + 4]
 
     @property
     def slope(self) -> int:
-        """The mean log-slope."""
+        """Index of the mean log-slope."""
         return self.k + 2
 
     @property
     def lapse(self) -> int:
-        """The logit of the lapse rate."""
+        """Index of the logit of the lapse rate."""
         return self.k + 5
 
 
 class Marginal:
-    """Remembers the last modes, so that the next search begins there."""
+    """Marginal likelihood of n persons. The last modes, `latent` (n, k + 2), are kept as the start of the next
+    search."""
 
     def __init__(self, likelihood: TrialLikelihood, latent: FloatArray) -> None:
         self.likelihood, self.latent = likelihood, latent
@@ -72,7 +75,7 @@ class Marginal:
         self._longest = np.array([LONGEST_STEP_DB] * likelihood.frequencies + [LONGEST_STEP_SLOPE, LONGEST_STEP_D])
 
     def evaluate(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Log marginal likelihood of each person (n,), and its gradient (n, size)."""
+        """Log marginal likelihood of each person (n,), and its gradient (n, size). parameters: (size,)."""
         layout, k = self.layout, self.layout.k
         precision, centre = prior_precision(parameters, k), _centre(parameters, k)
         lapse = float(expit(parameters[layout.lapse]))
@@ -106,13 +109,13 @@ class Marginal:
         return value, scores
 
     def centres(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mode of each person (n, k + 2), and the information of the answers there (n, k + 2, k + 2)."""
+        """Mode of each person (n, k + 2), and the expected information of the answers there (n, k + 2, k + 2)."""
         k, lapse = self.layout.k, float(expit(parameters[self.layout.lapse]))
         found = self._find_modes(prior_precision(parameters, k), _centre(parameters, k), lapse)
         return self.latent, found.information
 
     def _find_modes(self, precision: FloatArray, centre: FloatArray, lapse: float) -> Derivatives:
-        """Newton's method for all persons at once; a step that does not gain is halved for that person alone."""
+        """Newton's method for all persons at once; a step that lowers a person's log posterior is divided by 3."""
         latent = self.latent.copy()
         now = self.likelihood.evaluate(latent, lapse)
         height = _log_posterior(now, latent - centre, precision)
@@ -140,12 +143,14 @@ class Marginal:
 
 
 def _log_posterior(found: Derivatives, deviation: FloatArray, precision: FloatArray) -> FloatArray:
+    """(n,): log-likelihood plus log prior, without the prior's constant."""
     height: FloatArray = found.value - 0.5 * np.einsum("na,ab,nb->n", deviation, precision, deviation)
     return height
 
 
 def _positive_curvature(observed: FloatArray, expected: FloatArray) -> FloatArray:
-    """Far from a mode the observed curvature may be indefinite: the expected one then leads uphill."""
+    """(n, d, d): the observed curvature, or the expected curvature for persons whose observed curvature is not
+    positive definite, as may be far from a mode: the Newton step then still leads uphill."""
     lowest = np.linalg.eigvalsh(observed)[:, 0]
     if lowest.min() > LOWEST_CURVATURE:
         return observed
@@ -153,6 +158,7 @@ def _positive_curvature(observed: FloatArray, expected: FloatArray) -> FloatArra
 
 
 def _centre(parameters: FloatArray, k: int) -> FloatArray:
+    """(k + 2,): prior means of the thresholds, the log-slope and the criterion (0)."""
     return np.concatenate([parameters[:k], [parameters[k + 2], 0.0]])
 
 
@@ -168,7 +174,7 @@ def prior_precision(parameters: FloatArray, k: int) -> FloatArray:
 
 
 def _precision_derivatives(parameters: FloatArray, k: int) -> list[tuple[int, FloatArray, float]]:
-    """Per log SD: its place, the change of the precision, and of the precision's log determinant."""
+    """For each log SD: its index, the derivative of the precision, and that of the precision's log determinant."""
     shared, own = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
     together = own + k * shared
     mean = np.full((k, k), 1.0 / k)

@@ -1,11 +1,11 @@
 """Thresholds of persons who cannot be compared with others: one participant alone, or people at a single frequency.
 
-No estimate is drawn towards another person's (no shrinkage). The population's parameters of the hierarchical model are
-not fitted but fixed, so that its distributions of persons become priors: each threshold is normal around the mean level
-played with an SD of 30 dB, the logarithm of the slope around that of usual people with an SD of 0.4 (a factor of 1.5),
-the response bias around 0 with an SD of 0.3 d'. Only the lapse rate is fitted, at its prior of `objective.Prior`; then
-thresholds, slopes and biases are the maximum a posteriori. Each run also has the likelihood interval of
-`run_likelihood`, in which slope, bias and lapse rate are averaged over the same priors.
+Estimates of different persons do not influence each other (no shrinkage). The population parameters of the hierarchical
+model are not fitted but fixed, so that its distributions of persons become priors, all normal: each threshold around
+the mean level played with an SD of 30 dB, the logarithm of the slope around its usual value with an SD of 0.4 (a factor
+of 1.5), the criterion (response bias) around 0 with an SD of 0.3 d'. Only the lapse rate is fitted, under its prior of
+`objective.Prior`; then thresholds, slopes and criteria are the maximum a posteriori. Each run also has the likelihood
+interval of `run_likelihood`, in which slope, criterion and lapse rate are averaged over the same priors.
 """
 
 import math
@@ -27,9 +27,11 @@ SLOPE_LOG_SD, CRITERION_SD = 0.4, 0.3
 """Standard deviations of the priors of a slope's logarithm and of a criterion (d'): twice the differences among the
 simulated people of `hapteq power`."""
 LAPSE_QUANTILES = (1 / 6, 1 / 2, 5 / 6)
-"""Quantiles of the lapse rate's prior that are averaged over: the middles of three equally probable parts."""
+"""Quantiles of the lapse rate's prior over which a run's likelihood is averaged: the medians of three equally probable
+parts."""
 FREE_DB = 30.0
-"""SD (dB) of the prior of each threshold around the mean level played: keeps those finite that answers do not bound."""
+"""SD (dB) of the prior of each threshold around the mean level played: keeps a threshold finite that the answers do not
+bound."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +40,11 @@ class SinglePersons:
 
     family: Family
     frequencies_hz: tuple[float, ...]
-    """Those with answers, in ascending order."""
+    """Frequencies with answers, in ascending order."""
     confidence: float
     persons: tuple[PersonEstimate, ...]
     lapse: float
-    """Most probable lapse rate, the same for all."""
+    """Most probable lapse rate, the same for all persons."""
     runs: tuple[RunLikelihood, ...]
 
 
@@ -50,12 +52,12 @@ def fit_single_persons(
     answers: Answers, cap_n: float, family: Family = Family.WEIBULL, confidence: float = CONFIDENCE
 ) -> SinglePersons:
     """Most probable thresholds, slopes and criteria at the most probable lapse rate, and the likelihood interval of
-    each run. cap_n: highest level that could be played."""
+    each run. cap_n: highest level that could be played, N."""
     answers, cap_db, prior = at_played_frequencies(answers), to_db(cap_n), Prior()
     objective = Objective(answers, family, prior)
     parameters, layout = objective.begin.copy(), objective.layout
     parameters[: layout.k] = np.average(answers.level_db, weights=answers.right + answers.wrong)
-    # In the order of `Layout.log_sds`; what frequencies have in common (1 dB) is nothing beside what each has alone.
+    # In the order of `Layout.log_sds`. The part common to all frequencies (SD 1 dB) is negligible.
     parameters[layout.log_sds] = [0.0, math.log(FREE_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
 
     def cost(logit_lapse: float) -> float:
@@ -63,7 +65,7 @@ def fit_single_persons(
         return objective(parameters)[0]
 
     parameters[layout.lapse] = minimize_scalar(cost, bounds=LAPSE_BOUNDS, method="bounded", options={"xatol": 1e-3}).x
-    objective(parameters)  # leaves the persons' most probable values at this lapse rate in `marginal.latent`
+    objective(parameters)  # sets `marginal.latent` to the persons' most probable values at this lapse rate
     lapse = float(expit(parameters[layout.lapse]))
     persons = estimate_persons(answers.subjects, objective.marginal.latent, cap_db)
     lapses = tuple(float(lapse) for lapse in beta.ppf(LAPSE_QUANTILES, prior.lapse_wrong, prior.lapse_right))

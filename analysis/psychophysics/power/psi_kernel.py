@@ -1,10 +1,13 @@
-"""One run by Psi of a simulated participant, compiled: no device, no session, no file.
+"""The Psi method (Kontsevich and Tyler 1999) for one run of a simulated participant, compiled for power analyses.
 
-The rule is that of `protocols.procedure.psi`, with the same grid; tests hold the levels equal to those of
-`protocols.procedure.staircase.step`. Two things make it some hundred times faster. The log of the posterior grows
-answer by answer. And the entropy that a level leaves is written so that all logarithms of shares are known beforehand:
-with p the probability of a cell and s the share of one answer there, the sum over cells and answers of s p log(s p) is
-that of p (s log s), plus the sum of p log p, which is the same for all levels.
+The rule and its grid are those of `protocols.procedure.psi`; tests verify that the levels equal those of
+`protocols.procedure.staircase.step`. It is some hundred times faster for two reasons. The logarithm of the posterior is
+updated after each answer instead of recomputed. And with p the posterior of a cell and s the share of an answer there,
+the expected entropy uses tables of s log s that do not depend on the run, because sum over answers of s = 1:
+
+    sum over cells and answers of  s p log(s p)  =  sum of p (s log s)  +  sum over cells of p log p;
+
+the last sum is the same for all levels and is left out.
 """
 
 import math
@@ -22,26 +25,30 @@ from protocols.procedure.staircase import to_db
 
 
 class PackedPsi(NamedTuple):
-    """Psi's grid and tables as arrays. A cell is a threshold with a slope, a level 0 the start of a run."""
+    """The grid of the Psi method and its tables as arrays. A cell is a pair of threshold and slope; level index 0 is
+    the start of a run."""
 
     levels_db: FloatArray
-    """(1 + levels,): the start, then ascending to the cap."""
+    """(1 + levels,): dB re 1 N: the start, then ascending to the force cap."""
     cells_db: FloatArray
-    """(cells,): threshold of each."""
+    """(cells,): threshold of each cell, dB re 1 N."""
     cap_db: float
+    """Force cap, dB re 1 N."""
     right: FloatArray
-    """(1 + levels, cells): share of right answers."""
+    """(1 + levels, cells): probability of a right answer."""
     log_shares: FloatArray
-    """(2, 1 + levels, cells): logarithms of the shares of wrong and right answers."""
+    """(2, 1 + levels, cells): natural logarithms of the probabilities of a wrong and of a right answer."""
     known: FloatArray
-    """(1 + levels, cells): sum over both answers of share times its logarithm."""
+    """(1 + levels, cells): sum over both answers of s log s, with s the probability of the answer."""
     trials: int
+    """Most trials of a run."""
     spread_db: float
+    """A run ends when the standard deviation of the threshold's posterior is at most this, dB."""
 
 
 @cache
 def pack_psi(rule: StaircaseRule) -> PackedPsi:
-    """The grid and the tables of a rule whose levels Psi chooses."""
+    """The grid and the tables of a rule whose levels the Psi method chooses."""
     cap_db = to_db(rule.cap_n)
     levels = np.array([to_db(rule.start_n), *levels_db(cap_db)])
     right = share_right(levels, cap_db).reshape(len(levels), -1)
@@ -53,7 +60,7 @@ def pack_psi(rule: StaircaseRule) -> PackedPsi:
 
 @njit(cache=True)
 def to_probability(log_p: FloatArray) -> FloatArray:
-    """Posterior of every cell."""
+    """(cells,): posterior probability of every cell from its logarithm, which need not be normalised."""
     weight = np.exp(log_p - log_p.max())
     share: FloatArray = weight / weight.sum()
     return share
@@ -61,7 +68,8 @@ def to_probability(log_p: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def best_level(psi: PackedPsi, probability: FloatArray) -> int:
-    """The lowest of the levels that leave the least entropy."""
+    """Index of the level with the least expected posterior entropy (nats), the lowest of those within `SAME_BITS` of
+    it. probability: (cells,)."""
     chances, left = psi.right @ probability, -(psi.known @ probability)
     least = math.inf
     for level in range(1, len(left)):
@@ -76,7 +84,8 @@ def best_level(psi: PackedPsi, probability: FloatArray) -> int:
 
 @njit(cache=True)
 def play_psi(psi: PackedPsi, person: Participant, seed: int, track: Track) -> RunFound:
-    """Plays until the run ends, and fills the track but for its reversals."""
+    """Simulate a run until it ends, and fill the track except its reversals. The result has the mean of the threshold's
+    posterior, and the probability that the threshold lies above the cap."""
     np.random.seed(seed)
     log_p = np.zeros(len(psi.cells_db))
     probability = to_probability(log_p)

@@ -1,14 +1,14 @@
-"""Dry friction over one step, compiled: a bristle that is deflected, slips and springs back within the step.
+"""Dry friction over one time step, compiled: the bristle of the LuGre model, integrated within the step.
 
-Friction with a jump at v = 0 has no solution at a fixed step. The bristle of LuGre (Canudas de Wit and others 1995)
-replaces the jump by a spring of stiffness level / 50 nm with a damper: dz/dt = v - |v| z / z_max, F = -(stiffness z +
-damping dz/dt). It slips after tens of nanometres, far less than a position sensor resolves, so that F = -level sgn(v)
-holds in sliding and any smaller force is balanced at rest; an accelerometer shows the finite time in which the force
-reverses.
+Coulomb friction jumps at v = 0, so that a scheme with a fixed step has no consistent force there. The LuGre bristle
+(Canudas de Wit and others 1995, IEEE Trans. Autom. Control 40:419) replaces the jump by a spring with a damper:
+    dz/dt = v - |v| z / z_max,    F = -(stiffness z + damping dz/dt),    stiffness = level / z_max,    z_max = 50 nm.
+The bristle slips after tens of nanometres, far less than a position sensor resolves: sliding friction is -level sgn(v),
+and at rest any smaller force is balanced. An accelerometer shows the finite time in which the force reverses.
 
-Within the step the deflection has a closed form for a given travel, and the travel is found by Newton's method, because
-it depends on the force. Everything that stays the same over the step is divided out once: this law takes most of the
-time of a fit with friction.
+For a travel s without reversal the deflection has a closed form, z_max + (z - z_max) exp(-s / z_max); the travel
+depends on the force and is found by Newton's method. All quantities are divided by z_max, step and level once per step,
+because this law takes most of the time of a fit with friction.
 """
 
 import numpy as np
@@ -19,19 +19,20 @@ from equalizer.laws.kernel import UNCOUNTED
 from equalizer.signals.signal import FloatArray
 
 LONGEST_M = 50e-9
-"""Deflection z_max at which the bristle slips."""
+"""z_max (m): deflection at which the bristle slips."""
 DAMPED = 0.5
-"""Damping of the bristle over sqrt(stiffness times the mass that it holds)."""
+"""Damping of the bristle over sqrt(stiffness * mass), with the mass that it holds: twice the damping ratio."""
 PARTS = 12
-"""Most parts of a step in which the bristle is followed while it is deflected."""
+"""Maximum number of parts into which a step is divided while the bristle is deflected."""
 STUCK = 0.3
-"""Travel per part, in units of z_max, that is fine enough for the bristle."""
+"""Intended travel per part, in units of z_max: sets the number of parts."""
 BENT = 1 - 1e-6
-"""Share of the full bristle force above which the bristle counts as fully bent (sliding)."""
+"""Share of the full deflection above which the bristle counts as sliding."""
 ITERATIONS = 12
-"""Most Newton iterations for the travel of one part."""
+"""Maximum number of Newton iterations for the travel of one part."""
 NEAR = 3e-3
-"""Error of the travel, over z_max, that the last iteration's linear correction takes to about its square."""
+"""Residual of the travel equation, in units of z_max, at which the iteration ends: the last linear correction reduces
+it to about its square."""
 _VECTOR = types.float64[::1]
 
 
@@ -39,11 +40,13 @@ _VECTOR = types.float64[::1]
 def _deflect(
     bend: float, free: float, compliance: float, damping: float, full: tuple[float, float]
 ) -> tuple[float, float]:
-    """Deflection at the end of a part of a step, and the mean force over it.
+    """Deflection at the end of a part of a step, and the mean bristle force over it, opposed to the motion.
 
-    All over z_max and the level. bend: deflection at the start; free: travel without the bristle's force; compliance:
-    travel per force; damping: force per travel; full: deflections in sliding forwards and backwards, >= 0.
+    Lengths are in units of z_max, forces in units of the level. bend: deflection at the start; free: travel without the
+    bristle's force; compliance: travel per force; damping: force per travel; full: deflections in sliding forwards and
+    backwards, >= 0.
     """
+    # Newton's method for off(travel) = travel - free + compliance * mean force = 0; rate: d ahead / d travel.
     travel = free / (1.0 + compliance * (1.0 + damping))
     ahead, rate, off = bend, 0.0, 0.0
     for _ in range(ITERATIONS):
@@ -70,21 +73,22 @@ def _deflect(
     **UNCOUNTED,
 )
 def friction_force(forward: float, backward: float, start: float, memory: FloatArray, at: FloatArray) -> float:
-    """Mean force over a step of friction with the level `forward` where v > 0 and `backward` where v < 0.
+    """Mean friction force (N) over a step, with the level (N) `forward` where v > 0 and `backward` where v < 0.
 
-    start: deflection over z_max at the step's start; `memory[0]` becomes that at its end. `at[F_END]` becomes the force
-    at the end.
+    start: deflection over z_max at the start of the step. at: see `instant`. Writes the deflection at the end to
+    `memory[0]` and the force (N) at the end to `at[F_END]`.
     """
     level, speed, per_newton = max(forward, backward), at[V], at[V_PER_N]
     if level <= 0:
         at[F_END] = 0.0
         return 0.0
     sliding = -forward if speed > 0 else backward
+    # The velocity does not reverse within the step and the bristle slips already: the force is constant.
     full = -sliding / level
     if speed * (at[V_FREE] + per_newton * sliding) > 0 and start * full > BENT * full * full:
         memory[0], at[F_END] = full, sliding
         return sliding
-    # From here on in units of z_max, the step, and the level.
+    # From here on: lengths in units of z_max, times of the step, forces of the level. give: stiffness step² / mass.
     step_s = at[STEP_S]
     v, free_change, give = (
         speed * step_s / LONGEST_M,
@@ -108,11 +112,13 @@ def friction_force(forward: float, backward: float, start: float, memory: FloatA
 
 
 _PATH = types.Array(types.float64, 1, "A", readonly=True)
+"""A vector of any stride that is only read."""
 
 
 @njit(types.float64[::1](_PATH, types.float64), cache=True)
 def bristle_bend(position: FloatArray, longest: float) -> FloatArray:
-    """(n,): deflection over `longest`, at which the bristle slips (Dahl's equation). position: (n,), any unit."""
+    """(n,): deflection over `longest`, the deflection at which the bristle slips, by Dahl's equation dz/dx = 1 - sgn(v)
+    z along a position (n,) in the unit of `longest`; from 0 at the first sample."""
     bend = np.zeros(position.shape[0])
     for k in range(1, position.shape[0]):
         travel = (position[k] - position[k - 1]) / longest

@@ -1,8 +1,9 @@
-"""Force of a discovered law over one step, compiled: implicit solution by secant and bisection.
+"""Force of a discovered law over one integration step, compiled: implicit solution by secant and bisection.
 
-The mean of the force at the step's start and end, where the motion at its end depends on it; with accelerations, the
-force at its end. Where the force depends so steeply on the motion that the mean would oscillate (dry friction, stops),
-only the end counts, so that the motion can stick.
+The force F that is held over the step solves F = (1 - w) F_start + w F_end(F), because the motion at the step's end
+depends on F. The weight w is 1/2 (trapezoidal rule) for a force that hardly depends on the motion, and grows with the
+steepness of that dependence up to 1 (backward Euler), where the mean would oscillate (dry friction, stops): the motion
+can then stick. A law that reads an acceleration has w = 1.
 """
 
 from numba import njit
@@ -30,11 +31,13 @@ from equalizer.signals.signal import FloatArray
 
 AXES, ACCELERATION, CONDITIONS, SAMPLES, RATE_HZ, TABLE = range(6)
 """Indices in `parameters`: number of driven axes; whether the law reads an acceleration; number of recorded
-conditions, of their samples, and their rate; start of the conditions, sample by sample. The program follows them."""
+conditions, number of their samples, and their rate (Hz); first value of the conditions, which are stored sample by
+sample. The law's program follows them."""
 PER_AXIS = 4
-"""Signals: the time, then each axis' position, velocity, acceleration and command, then the conditions."""
+"""Signals per driven axis: position, velocity, acceleration, command. The time precedes those of all axes, the
+conditions follow them."""
 CLOSE = 1e-7
-"""Relative tolerance of a force that depends on the motion it causes."""
+"""Tolerance of the implicit equation, relative to the forces of its first evaluations."""
 TRIES = 60
 """Most iterations of the root search (regula falsi and bisection in turn) for a law's force at the end of a step."""
 
@@ -43,8 +46,8 @@ TRIES = 60
 def _law_value(
     parameters: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force: float, ahead: float
 ) -> float:
-    """The law's force at the step's start or end, if the given force acted over the step. Accelerations are means over
-    the step; ahead: 1 for those at its end."""
+    """The law's force (N) at the step's start or end (`phase`), if `force` acted over the step. Accelerations are means
+    over the step; with ahead = 1 they are extrapolated linearly to its end."""
     axes, conditions, step_s = int(parameters[AXES]), int(parameters[CONDITIONS]), at[STEP_S]
     count = 1 + PER_AXIS * axes + conditions
     signals = memory[DEEPEST : DEEPEST + count]
@@ -72,8 +75,8 @@ def _law_value(
 
 @njit(inline="always")
 def _end_share(start: float, first: float, second: float) -> float:
-    """Weight of the step's end in the mean: one half, more where the force is steep, all where it would oscillate.
-    first: the end's force if that of the start acted; second: if `first` acted."""
+    """Weight w of the step's end: (1 + s) / 2, limited to 1/2 to 1, with the slope s = -dF_end/dF as a difference
+    quotient. first: the end's force if that of the start acted; second: the end's force if `first` acted."""
     change = first - start
     steep = (first - second) / change if change != 0.0 else 0.0
     return min(0.5 * (1.0 + max(steep, 0.0)), 1.0)
@@ -96,6 +99,7 @@ def law_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> flo
     late = 1.0 if heavy else _end_share(start, first, second)
     low_off, high_off = low - (1 - late) * start - late * first, high - (1 - late) * start - late * second
     near, force = CLOSE * (abs(start) + abs(first) + abs(second)), high
+    # Every second step bisects if the root is bracketed; the others are secant steps.
     for turn in range(TRIES):
         across = high_off - low_off
         within = (low_off < 0) != (high_off < 0)
@@ -113,7 +117,7 @@ def law_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> flo
             if not within:
                 low, low_off = high, high_off
             high, high_off = force, off
-    # In sticking, the force is between those of the two sliding directions.
+    # While sticking, the end's force lies between those of the two sliding directions: solved for, not evaluated.
     at[F_END] = _law_value(parameters, memory, at, END, force, 1.0) if heavy else (force - (1 - late) * start) / late
     commit_step(parameters[TABLE + int(parameters[SAMPLES]) * conditions :], kept, at[TIME_S] + at[STEP_S])
     return float(force)

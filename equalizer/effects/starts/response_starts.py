@@ -1,4 +1,7 @@
-"""Starting values of sensor effects, from measured and predicted responses."""
+"""Starting values of effects at the response: parameter values and time shifts of the predicted to the measured one.
+
+A single parameter is found by grid search, a time shift by cross-correlation, refined by Gauss-Newton steps.
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -12,10 +15,10 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 LEAST_SHARE = 1e-3
-"""Least share of the misfit that a value must explain to be tried."""
+"""Least share of the sum of squares by which a value must reduce it to become a starting value."""
 
 NEARER = 3
-"""Rounds of refinement of a time shift."""
+"""Gauss-Newton steps that refine a time shift."""
 
 
 def channels_of(evidence: Evidence, site: int) -> tuple[int, ...]:
@@ -29,8 +32,9 @@ def likeliest_reading(
     change: Callable[[FloatArray, float], FloatArray],
     grid: Sequence[float],
 ) -> float | None:
-    """The parameter value that brings the predicted response closest to the measured one: grid search (rising, above
-    zero), refined. change: samples (n, channels), value. None where no value improves it."""
+    """The parameter value that brings the predicted response closest to the measured one, in units of the noise: grid
+    search, refined by golden section. change: maps samples (n, channels) and a value to changed samples. grid: positive
+    values in ascending order. None where no value improves the fit."""
     channels = list(channels_of(evidence, site))
     used, noise = evidence.used > 0, evidence.noise[channels]
     measured, predicted = evidence.response[:, channels], evidence.predicted[:, channels]
@@ -43,8 +47,8 @@ def likeliest_reading(
 
 
 def axis_lateness(evidence: Evidence, axis: int, longest_s: float) -> float:
-    """Seconds by which the measured response to a driven axis lags the predicted one; in that axis's own channel, where
-    each axis has one."""
+    """Time (s) by which the measured response to a driven axis lags the predicted one: in the axis's own channel where
+    there are as many channels as axes, else over all channels. At most `longest_s` either way."""
     rate, own = evidence.sample_rate_hz, evidence.response.shape[1] == evidence.command.shape[1]
     channels = list(channels_of(evidence, axis if own else ALL_SITES))
     weight = evidence.used[:, None] / evidence.noise[channels]
@@ -53,9 +57,9 @@ def axis_lateness(evidence: Evidence, axis: int, longest_s: float) -> float:
 
 
 def starts_for_lateness(evidence: Evidence, axis: int, fitting: float | None, longest_s: float) -> tuple[float, ...]:
-    """Delays or time constants in seconds to start from: the response's time shift, and the value that fits the missing
-    force. Re-tuned damping absorbs most of a small lag, so that a fifth of a sample is always tried unless the response
-    is early."""
+    """Delays or time constants in s to start from, the largest first: the response's time shift, and `fitting`, the
+    value that fits the missing force. Neither is below a fifth of a sample, because re-tuned damping absorbs most of a
+    small lag. Empty where the response is early by more than that."""
     late, least = axis_lateness(evidence, axis, longest_s), 0.2 / evidence.sample_rate_hz
     if late < -least:
         return ()
@@ -67,14 +71,14 @@ def shares_of(residual: FloatArray, basis: FloatArray, used: FloatArray) -> Floa
     columns = basis[used > 0]
     size = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
     columns = columns / size
-    # A few columns of equal length: the normal equations lose no digits that matter, and cost a tenth of a QR.
+    # Few columns, scaled to length 1: the normal equations are accurate enough, and cost a tenth of a QR.
     found = np.linalg.lstsq(columns.T @ columns, columns.T @ residual[used > 0], rcond=None)[0]
     return np.asarray(found / size, dtype=np.float64)
 
 
 def lateness(measured: FloatArray, predicted: FloatArray, longest: int) -> float:
-    """Samples by which the measured response (n, p) lags the predicted one, by cross-correlation; at most
-    `longest`."""
+    """Samples by which the measured response (n, p) lags the predicted one, from the peak of the normalised
+    cross-correlation, summed over channels. At most `longest` either way; not refined at that limit."""
     longest = min(longest, len(measured) - 1)
     room = next_fast_len(len(measured) + longest, True)
     total: FloatArray = np.zeros(2 * longest + 1)
@@ -88,7 +92,8 @@ def lateness(measured: FloatArray, predicted: FloatArray, longest: int) -> float
 
 
 def _refine_lateness(measured: FloatArray, predicted: FloatArray, late: float) -> float:
-    """Refine a time shift by Gauss-Newton steps, because the peak of a correlation is biased between samples."""
+    """Time shift (samples) refined by Gauss-Newton steps to a fraction of a sample, without the bias of an interpolated
+    correlation peak."""
     for _ in range(NEARER):
         shifted = read_other_times(predicted, 1.0, -late)
         slope = np.gradient(shifted, axis=0)

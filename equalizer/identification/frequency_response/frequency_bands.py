@@ -1,9 +1,14 @@
-"""Frequency bands and the control method that suits each (the published figure 1)."""
+"""Frequency bands of a haptic device and the control method that suits each (figure 1 of Wilson, Chan, Salisbury and
+Niemeyer, Multi-DOF Equalization of Haptic Devices).
+
+Two frequencies divide the range: the onset of coupling, above which the device mixes its axes, and the limit of
+direction perception, above which people hardly perceive the direction of a vibration.
+"""
 
 from dataclasses import dataclass
 
 PUBLISHED_DIRECTION_LIMIT_HZ = 35.0
-"""Highest frequency at which people told directions apart on an omega.3 (Wilson, Chan, Salisbury, Niemeyer)."""
+"""Highest frequency (Hz) at which people could distinguish directions on an omega.3, as published (see above)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,7 +16,7 @@ class FrequencyBand:
     """A band of frequencies, the control method that suits it, and the reason as a sentence."""
 
     name: str
-    """low, middle or high"""
+    """"low", "middle" or "high"."""
     low_hz: float
     high_hz: float
     method: str
@@ -24,8 +29,9 @@ def frequency_bands(
     lowest_hz: float = 1.0,
     highest_hz: float = 500.0,
 ) -> tuple[FrequencyBand, ...]:
-    """Bands in rising order. Without a middle band where coupling begins (None: not at all) above the limit of
-    direction, because then no frequency needs all axes at once. Raises ValueError for a limit outside the range."""
+    """Bands in ascending order, from lowest_hz to highest_hz. coupling_onset_hz: None = no coupling was found. There is
+    no middle band where coupling begins above the limit of direction perception or not at all, and no low band where it
+    begins below lowest_hz. Raises ValueError for a limit outside the range."""
     if not lowest_hz < direction_limit_hz < highest_hz:
         raise ValueError(
             f"direction_limit_hz is {direction_limit_hz:g}; it must lie between {lowest_hz:g} and {highest_hz:g} Hz"
@@ -44,3 +50,4 @@ _METHODS = (
     ("middle", "all axes equalized together", "Directions are felt, but the device mixes its axes."),
     ("high", "each axis by itself", "Directions are hardly felt, so the axis may be chosen to spare a motor."),
 )
+"""Name, control method and reason of each band, from low to high."""

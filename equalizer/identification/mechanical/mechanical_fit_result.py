@@ -6,7 +6,8 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 
 
 class MechanicalFitRefused(ValueError):  # noqa: N818 - an answer that a user reads, as in the rest of the package
-    """No mechanical model can be fitted to the recordings; the text says why, and which would do."""
+    """No mechanical model can be fitted to the recordings. The message states the reason and, where there is any, the
+    remedy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,11 +16,11 @@ class MechanicalFitSettings:
     number of modes, or a floor outside 0 to 1."""
 
     band_hz: tuple[float, float] | None = None
-    """Band of the fit; None: the band that the commands excite, from the lowest line on."""
+    """Band of the fit in Hz; None: the band that the commands excite, from the lowest line on."""
     most_modes: int = 8
-    """Most modes beside the driven axes."""
+    """Largest number of modes in addition to the driven axes."""
     sensor: SensorLimits = field(default_factory=SensorLimits)
-    """Sensor of the data sheet: it is taken as known, not fitted."""
+    """Sensor as its data sheet describes it: taken as known, not fitted."""
     actuator: ActuatorLimits = field(default_factory=ActuatorLimits)
     """Actuator known beforehand; its delay is the starting value where a delay is fitted."""
     sensors_elsewhere: bool | None = None
@@ -50,11 +51,14 @@ class OrderTried:
     what: str
     """Description of the structure: "driven axes alone", "with 2 modes", "with a delay"..."""
     coordinates: int
+    """Number of generalized coordinates; of modes where the shapes are free."""
     parameters: int
+    """Number of fitted parameters."""
     error: float
-    """Weighted root-mean-square error on lines left out of the fit (cross-validation): 1 is noise and `floor`
-    together."""
+    """Weighted root-mean-square error on lines left out of the fit (cross-validation). 1: as large as expected from
+    noise and `floor` together."""
     accepted: bool
+    """Whether the order selection adopted this structure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +68,7 @@ class ChannelError:
     channel: str
     fit: float
     held_out: float | None
-    """Error of a free simulation of the held-out samples, started from the state that fits best; None without such
+    """Error of a free simulation of the held-out samples from the best-fitting initial state; None without such
     samples."""
     noise: float | None
     """Noise: rms of the differences between periods; None where nothing repeats."""

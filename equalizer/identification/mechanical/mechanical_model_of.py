@@ -1,4 +1,9 @@
-"""Conversion of a fitted structure to a mechanical model in absolute coordinates, with tolerances."""
+"""Conversion of a fitted structure to a mechanical model with tolerances, in coordinates that have a physical meaning.
+
+Oscillators are fitted in coordinates relative to the driven axes, and modes in modal coordinates; the model has
+absolute coordinates instead, in which an oscillator is a mass at the end of a spring. Tolerances are standard
+deviations from the covariance of the least-squares fit, s² (J'J)^-1, with J the Jacobian and s² the residual variance.
+"""
 
 from dataclasses import replace
 
@@ -12,14 +17,17 @@ from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
 LEAST_TOLERANCE = 0.01
-"""Smallest relative tolerance: no calibration is better than its force sensor or current loop."""
+"""Smallest relative standard deviation: a calibration is not more exact than its force sensor or current loop."""
 
 
 AnyFit = RefinedFit[Structure] | RefinedFit[ModalStructure]
+"""A fit with either parametrisation: oscillators on the driven axes, or modes with free shapes."""
 
 
 def readable_model(fit: AnyFit, name: str) -> MechanicalModel:
-    """Mechanical model of a fit with its tolerance, in absolute coordinates: oscillators' masses are diagonal."""
+    """Mechanical model of a fit with its tolerance, in absolute coordinates, in which oscillators have no inertial
+    coupling with the driven axes; a fit with modes is converted by `to_driven_axes`. Raises numpy.linalg.LinAlgError
+    where such modes do not move every driven axis independently."""
     model = fit.structure.model(fit.unknowns, name)
     if isinstance(fit.structure, ModalStructure):
         model = to_driven_axes(model)
@@ -29,9 +37,9 @@ def readable_model(fit: AnyFit, name: str) -> MechanicalModel:
 
 
 def tolerance_of(fit: AnyFit) -> Tolerance:
-    """Standard deviations from the size of the residuals, the largest over the driven axes. For modes with free shapes
-    only those of the frequencies: without a sensor at a command, the data do not determine how strongly it drives
-    them."""
+    """Standard deviations of mass, damping and stiffness, the largest over the driven axes, and the median one of the
+    modal frequencies (relative), none below `LEAST_TOLERANCE`. For modes with free shapes that of the frequencies only:
+    without a sensor at a command, the data do not determine the mass there."""
     if isinstance(fit.structure, ModalStructure):
         structure = fit.structure
         logs = np.sqrt(np.diag(_covariance(fit))).reshape(structure.modes, -1)[:, 0]
@@ -40,6 +48,8 @@ def tolerance_of(fit: AnyFit) -> Tolerance:
 
 
 def _oscillator_tolerance(structure: Structure, fit: AnyFit) -> Tolerance:
+    """Tolerance of a structure of oscillators: the covariance of the unknowns, propagated to the values at the axes by
+    their Jacobian. The unknowns of the modes are log frequencies: their deviations are relative."""
     here = _axis_values(structure, fit.unknowns)
     slope = numerical_jacobian(
         lambda unknowns: _axis_values(structure, unknowns), fit.unknowns, here, np.full(structure.parameters, np.inf)
@@ -56,11 +66,13 @@ def _oscillator_tolerance(structure: Structure, fit: AnyFit) -> Tolerance:
 
 
 def _axis_values(structure: Structure, unknowns: FloatArray) -> FloatArray:
-    """(3 m,): masses, damping and stiffness to the ground at each driven axis."""
+    """(3 m,): mass, then damping to the ground, then stiffness to the ground, each at all m driven axes."""
     return np.concatenate([np.diag(part) for part in structure.find_grounded_parts(unknowns)])
 
 
 def _covariance(fit: AnyFit) -> FloatArray:
+    """Covariance of the unknowns (parameters, parameters). Columns of the Jacobian are scaled to length 1; directions
+    that the data do not determine are left out by the pseudo-inverse."""
     slope = fit.slope
     size = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
     inverse = np.linalg.pinv((slope / size).T @ (slope / size), rcond=1e-10)
@@ -69,7 +81,9 @@ def _covariance(fit: AnyFit) -> FloatArray:
 
 
 def _to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> MechanicalModel:
-    """e = |L| (z - hᵀ x): z is the position of an oscillator of mass |L|² along its direction h."""
+    """The model with absolute positions z of the oscillators in place of their relative modal coordinates
+    e = |L| (z - hᵀ x), where L is the participation, h = L / |L| the direction, and |L|² the mass of an oscillator.
+    Unchanged where a participation is too small to divide by. m: number of driven axes."""
     n, carrier, rest = model.coordinates, slice(m, 2 * m) if joint else slice(0, m), slice(2 * m if joint else m, None)
     participation = model.mass[rest, carrier]
     roots = np.linalg.norm(participation, axis=1)
@@ -78,6 +92,6 @@ def _to_absolute_coordinates(model: MechanicalModel, m: int, joint: bool) -> Mec
     change = np.eye(n)
     change[rest, rest], change[rest, carrier] = np.diag(roots), -participation
     mass, damping, stiffness = (change.T @ part @ change for part in (model.mass, model.damping, model.stiffness))
-    # Entries that the transformation makes zero are set to zero exactly.
+    # The transformation makes these entries zero up to rounding.
     mass[rest, carrier] = mass[carrier, rest] = 0.0
     return replace(model, mass=(mass + mass.T) / 2, damping=damping, stiffness=stiffness, output=model.output @ change)

@@ -1,4 +1,9 @@
-"""Refinement of a structure's unknowns by weighted nonlinear least squares of the output error on measured lines."""
+"""Refinement of a mechanical structure's unknowns by weighted nonlinear least squares on measured spectral lines.
+
+Minimises the sum over lines of |Y(f) - G(f, unknowns) U(f)|² / expected error power (output error; `LineGroup` holds
+the weighted spectra), with SciPy's bounded trust-region reflective method. Held-out lines measure the error of the
+result.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,16 +27,17 @@ class RefinedFit(Generic[S]):
     structure: S
     unknowns: FloatArray
     squares: float
-    """Sum of squares of the fitted lines' misfits."""
+    """Sum of squares of the fitted lines' misfits, each in units of its expected error."""
     left_out: float
-    """Sum of squares over the held-out lines."""
+    """Sum of squares of the held-out lines' misfits."""
     left_out_count: int
+    """Number of misfits in that sum."""
     slope: FloatArray
-    """(2 rows, parameters) at the solution."""
+    """Jacobian at the solution, (2 n, parameters): real, then imaginary parts of the n complex misfits."""
 
     @property
     def error(self) -> float:
-        """Root mean square over the held-out lines."""
+        """Root mean square misfit over the held-out lines, in units of the expected error; 0 without such lines."""
         return float(np.sqrt(self.left_out / max(self.left_out_count, 1)))
 
 
@@ -42,7 +48,8 @@ def refine_unknowns(
     band_hz: tuple[float, float],
     most_steps: int = 40,
 ) -> RefinedFit[S]:
-    """Refine unknowns from a start (parameters,). Raises ValueError where the start itself is not a valid model."""
+    """Refine unknowns from a start (parameters,). band_hz: fitted band, which sets the bounds. most_steps: maximum
+    number of evaluations. Raises MechanicalModelError where the start is not a valid model."""
     # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
     from scipy.optimize import least_squares
 
@@ -56,7 +63,7 @@ def refine_unknowns(
         try:
             found = stack_real(misfits(fitted, structure.model(unknowns)))
         except (np.linalg.LinAlgError, MechanicalModelError):
-            return np.full_like(worst, 1e6)
+            return np.full_like(worst, 1e6)  # large, so that the step to an invalid model is rejected
         return found if np.isfinite(found).all() else np.full_like(worst, 1e6)
 
     answer = least_squares(
@@ -75,7 +82,7 @@ def refine_unknowns(
 
 
 def _left_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
-    """Sum of squares, and number of terms."""
+    """Sum of squares of the held-out lines' misfits, and number of misfits in it."""
     pairs = list(zip(groups, misfits(groups, model), strict=True))
     squares = sum(np.sum(np.abs(misfit[group.left_out]) ** 2) for group, misfit in pairs)
     return float(squares), int(sum(group.count[group.left_out].sum() for group in groups))

@@ -1,14 +1,15 @@
-"""Frequency response of a mechanical model, sampled exactly as recordings are.
+"""Frequency response of a mechanical model from command samples to response samples, exact for the hold between them.
 
-By the poles p of M a + D v + K q = B u (the actuator's lag with them): each is a state x' = p x + u, whose response to
-a held command has a closed form, so that a line costs a product of small matrices. With z = e^(s T), T the sample
-period, and E(t) the integral of e^(p tau) over 0 < tau < t,
+M a + D v + K q = B u, with the actuator's lag, is decomposed into its poles p (modal form): each is a state
+x' = p x + u, whose response to a held command has a closed form, so that a spectral line costs a product of small
+matrices. With z = e^(s T), T the sample period, and E(t) the integral of e^(p tau) over 0 < tau < t,
 
     zero-order hold, delay k T + d, 0 <= d < T:  z^-k (E(T - d) + e^(p (T - d)) E(d) / z) / (z - e^(p T))
-    linear between samples:                      (E(T) + R (z - 1)) / (z - e^(p T)),  R the response to a ramp over T
+    linear between samples:                      (E(T) + R (z - 1)) / (z - e^(p T)),  R the state after a unit ramp
     band-limited:                                1 / (s - p)
 
-`response[k]` is taken just before `command[k]` is written, as in `signals.recording`.
+For the last two, a delay multiplies by e^(-s delay). `response[k]` is taken just before `command[k]` is written, as in
+`signals.recording`.
 
 Reference: Franklin, Powell and Workman, Digital Control of Dynamic Systems (1998), chapters 4 and 6.
 """
@@ -22,14 +23,15 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SMALL = 1e-9
-"""Magnitude of a pole times the step below which it is taken as an integrator."""
+"""Magnitude of a pole times the step below which the pole counts as an integrator."""
 _FASTEST_GROWTH = 200.0
-"""Largest growth: real part of a pole times the step."""
+"""Upper limit of the real part of a pole times the step: e to this power is still a finite number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoleForm:
-    """Pole-residue form of the plant in continuous time, without delay and sensor."""
+    """Pole-residue form of the plant in continuous time, without delay and sensor:
+    outputs diag(1 / (s - poles)) inputs + direct."""
 
     poles: ComplexArray
     """(states,), 1/s"""
@@ -40,7 +42,7 @@ class PoleForm:
     direct: FloatArray
     """(p, m)"""
     states: ComplexArray
-    """(states, states): each pole's share of each state's initial value."""
+    """(states, states): modal amplitude of each pole (row) for a unit initial value of each state (column)."""
 
 
 def pole_form(model: MechanicalModel) -> PoleForm:
@@ -64,8 +66,8 @@ def pole_form(model: MechanicalModel) -> PoleForm:
 def sample_response(
     model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, hold: Hold, form: PoleForm | None = None
 ) -> ComplexArray:
-    """Frequency response (lines, p, m), sensor and delay included; frequencies above zero. form: the model's, if
-    known."""
+    """Frequency response (lines, p, m), with sensor and delay, of commands that are held as `hold` says. frequency_hz:
+    (lines,), above zero. form: the model's, if known."""
     form = form or pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
     answers, direct = pole_responses(form.poles, z, rate_hz, hold, model.actuator.delay_s)
@@ -76,10 +78,10 @@ def sample_response(
 def free_response(
     model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, form: PoleForm | None = None
 ) -> ComplexArray:
-    """(lines, p, 2n): spectra of the free response to each state, per difference between its last and first value.
-    form: the model's, if known.
+    """Spectra (lines, p, states) of the free response to each state, per difference between the state's values at the
+    segment's two ends. form: the model's, if known.
 
-    A segment's spectrum is the response to its commands plus a real combination of these.
+    The spectrum of a segment is the response to its commands plus a real combination of these (transient, or leakage).
     """
     form = form or pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
@@ -91,15 +93,15 @@ def free_response(
 
 
 def _sum_poles(answers: ComplexArray, outputs: ComplexArray, inputs: ComplexArray) -> ComplexArray:
-    """(lines, p, m), in one product of matrices. answers: (lines, poles)."""
+    """Sum over the poles, (lines, p, m), in one product of matrices. answers: response of each pole, (lines, poles)."""
     residues = outputs.T[:, :, None] * inputs[:, None, :]
     flat = answers @ residues.reshape(len(residues), -1)
     return np.asarray(flat.reshape(len(answers), *residues.shape[1:]))
 
 
 def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> ComplexArray:
-    """(lines,): response of the sensor's low pass y += (1 - exp(-2 pi f / rate)) (x - y), f its bandwidth; 1 without
-    one."""
+    """(lines,): response of the sensor's first-order low-pass y += (1 - exp(-2 pi f / rate)) (x - y), f its bandwidth;
+    1 where the bandwidth is 0, which means no low-pass."""
     if not bandwidth_hz:
         return np.ones(len(z), dtype=np.complex128)
     left = np.exp(-2 * np.pi * bandwidth_hz / rate_hz)
@@ -109,6 +111,8 @@ def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> Com
 def _append_input_lag(
     A: FloatArray, B: FloatArray, C: FloatArray, direct: FloatArray, rate: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """State-space matrices A, B, C and D with a first-order lag in front of each input: u' = rate (command - u), rate
+    in 1/s."""
     n, m = B.shape
     lagged = np.block([[A, B], [np.zeros((m, n)), -rate * np.eye(m)]])
     driven = np.concatenate([np.zeros((n, m)), rate * np.eye(m)])
@@ -118,8 +122,8 @@ def _append_input_lag(
 def pole_responses(
     poles: ComplexArray, z: ComplexArray, rate_hz: float, hold: Hold, delay_s: float
 ) -> tuple[ComplexArray, ComplexArray]:
-    """(lines, poles), (lines,): response of each pole, and of the direct feedthrough, to a held command; as above. z:
-    (lines,), on the unit circle, none at 1."""
+    """Response to a held command of each pole, (lines, poles), and of the direct feedthrough, (lines,), by the formulas
+    of the module docstring. z: (lines,), on the unit circle, none equal to 1."""
     step, column = 1 / rate_hz, z[:, None]
     # A fit may try an unstable model: the growth per sample is limited, so that its response stays finite.
     poles = np.minimum(poles.real, _FASTEST_GROWTH * rate_hz) + 1j * poles.imag
@@ -140,14 +144,15 @@ def pole_responses(
 
 
 def _integrate_exponential(poles: ComplexArray, seconds: float) -> ComplexArray:
-    """Integral of e^(p t) over one step; (poles,)."""
+    """(poles,): integral of e^(p t) over 0 < t < seconds."""
     small = np.abs(poles) * seconds < _SMALL
     safe = np.where(small, 1.0, poles)
     return np.asarray(np.where(small, seconds, np.expm1(safe * seconds) / safe))
 
 
 def _integrate_ramp(poles: ComplexArray, step: float) -> ComplexArray:
-    """State at the end of a step for a command that rises linearly by one over it; (poles,)."""
+    """(poles,): state after a step in which the command rises linearly from 0 to 1. For a small |p| T, where the exact
+    form would lose its digits, a Taylor series."""
     small = np.abs(poles) * step < 1e-4
     safe = np.where(small, 1.0, poles)
     exact = (np.expm1(safe * step) - safe * step) / (safe**2 * step)

@@ -1,4 +1,13 @@
-"""Starting values of a mechanical fit: linear least squares on the dynamic stiffness."""
+"""Starting values of a mechanical fit: linear least squares on the dynamic stiffness.
+
+At each spectral line s = j w the command's force u and the motion x of the m driven axes obey
+
+    u = (M s² + D s + K) x + transient
+
+which is linear in the entries of the symmetric matrices M (mass), D (damping) and K (stiffness). The sensor's low pass,
+the hold and a trial delay are removed from the measured motion first; the delay with the least residual is kept. The
+matrices are then made positive definite, as the nonlinear fit needs.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,15 +21,17 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LEAST_EIGENVALUE = 0.05
-"""Least eigenvalue of the starting mass matrix, relative to the largest."""
+"""Least eigenvalue of the starting mass matrix, relative to the largest magnitude of an eigenvalue."""
 _DELAYS = 33
-"""Number of delays that are tried."""
+"""Number of trial delays, evenly spaced from zero."""
 _MOST_DELAY_CYCLES = 8.0
-"""Longest delay that is tried, in periods of the highest line."""
+"""Longest trial delay, in periods of the highest line."""
 
 
 def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: float) -> tuple[Structure, FloatArray]:
-    """Structure without modes, with the signs and scales that the data require, and its unknowns."""
+    """Structure without modes, with the sign and mass scale that the data require, and its unknowns. A single axis with
+    a negative mass has a sensor that counts the other way: its sign is reversed. floor: relative error of the response
+    that is allowed for besides the noise."""
     m = structure.inputs
     if structure.delayed:
         delays_s = np.linspace(0.0, _MOST_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _DELAYS)
@@ -51,7 +62,8 @@ def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: f
 def _solve_matrices(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, float]:
-    """Estimated entries of the three matrices, and the residual sum of squares."""
+    """Entries of mass, damping and stiffness (lower triangles, row by row), and the weighted residual sum of
+    squares."""
     rows, right = _stiffness_rows(segments, structure, floor, delay_s)
     found = solve_scaled(rows, right)
     m = structure.inputs
@@ -61,9 +73,10 @@ def _solve_matrices(
 def _stiffness_rows(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Real regressors and target of u = M a + D v + K x plus each segment's transient, weighted by the force's expected
-    error."""
+    """Regressors (rows, k) and target (rows,) of u = M a + D v + K x plus each segment's transient: real, then
+    imaginary parts, divided by the expected error of the force."""
     m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
+    # A held force shows in the acceleration one sample later, in velocity and position half a sample later.
     late_steps = 1.0 if order == 2 else 0.5
     blocks, right = [], []
     transients = [i for i, segment in enumerate(segments) if segment.transient]
@@ -84,6 +97,7 @@ def _stiffness_rows(
         ]
         ends = np.zeros((len(s), m, 3 * m * len(transients)), dtype=np.complex128)
         if each.transient:
+            # The states at the segment's ends add s, 1, 1 / s, over s^order, times unknown factors.
             for axis in range(m):
                 first = 3 * (m * transients.index(number) + axis)
                 ends[:, axis, first : first + 3] = s[:, None] ** (np.array([1, 0, -1]) - order)
@@ -103,7 +117,8 @@ def triangle_pairs(m: int) -> list[tuple[int, int]]:
 
 
 def _entry_force(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
-    """(lines, m): force of a unit entry of a symmetric matrix along a motion (lines, m)."""
+    """(lines, m): a symmetric matrix with this entry 1 and all others 0, times the motion (lines, m). pair: its row and
+    column."""
     force = np.zeros_like(motion)
     row, column = pair
     force[:, row] += motion[:, column]
@@ -127,12 +142,13 @@ def symmetric_matrix(entries: FloatArray, m: int) -> FloatArray:
 
 
 def _make_positive(matrix: FloatArray) -> FloatArray:
+    """The symmetric matrix with its eigenvalues raised to at least 0.001 of the largest magnitude."""
     values, vectors = np.linalg.eigh(matrix)
     return np.asarray((vectors * np.maximum(values, 1e-3 * max(np.abs(values).max(), 1e-300))) @ vectors.T)
 
 
 def _other_rows(segments: Sequence[SegmentLines], m: int) -> FloatArray:
-    """(p - m, m): output rows of the other responses on the driven axes, by least squares."""
+    """(p - m, m): output rows of the further responses: their least-squares weights on the driven axes' responses."""
     own = np.concatenate([segment.response[:, :m] for segment in segments])
     others = np.concatenate([segment.response[:, m:] for segment in segments])
     return np.asarray(

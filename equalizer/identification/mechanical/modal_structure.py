@@ -9,34 +9,37 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.signal import FloatArray
 
 _WIDEST = 10.0
-"""Ratio by which a mode's frequency may lie outside the band. By hand."""
+"""Factor by which a mode's frequency may lie outside the band of the fit. By hand."""
 _LEAST_RATIO, _LARGEST_RATIO = 1e-4, 100.0
 """Least and largest damping ratio of a mode; a rigid body on weak springs has the largest. By hand."""
 _WEAKEST = 1e-9
-"""Least strength of a mode, relative to the strongest."""
+"""Least singular value of the input matrix, relative to the largest: below it, an axis counts as not driven."""
 _SHARE = 0.5
-"""Largest strength at the force of a further mode, relative to the strongest of the rigid body; its
-readings are scaled up by what it loses. By hand."""
+"""Largest norm of the input shape of a flexible mode, relative to the largest of the rigid-body modes. By hand."""
 _ALIKE = 1.5
-"""Frequencies within this ratio of the slowest are those of the rigid body."""
+"""Modes count as rigid-body modes where their frequency is at most this factor above the lowest one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalStructure:
-    """Unknowns per mode: log of its frequency over `speed_scale`, log of its damping ratio, m entries of the shape at
-    the commands, p entries at the sensors; modal masses are one in `mass_scale`. The position's response is
+    """Structure of a modal model. Unknowns per mode: log(w / `speed_scale`) with w its natural frequency (rad/s), log
+    of its damping ratio, m entries of its shape at the commands, p entries at the sensors; the modal mass is
+    `mass_scale`. The response of the position to the force is
 
         Y(s) = sum over modes of  c b' / (s² + 2 ratio w s + w²)          c (p,), b (m,): shapes over sqrt(mass_scale)
     """
 
     inputs: int
+    """m, the number of commands."""
     outputs: int
+    """p, the number of sensors."""
     quantity: str
+    """Quantity of the response, as in `MechanicalModel`."""
     modes: int
     mass_scale: float
-    """kg, or kg m² of a rotational model: keeps the shapes' entries near one."""
+    """kg, or kg m² of a rotational model: keeps the entries of the shapes near 1."""
     speed_scale: float
-    """rad/s: keeps the frequencies' logarithms near zero."""
+    """rad/s: keeps the logarithms of the frequencies near 0."""
     sensor: SensorLimits
     actuator: ActuatorLimits
     rotational: bool
@@ -52,7 +55,7 @@ class ModalStructure:
         return self.modes
 
     def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
-        """The model in modal coordinates. unknowns: (parameters,), mode by mode."""
+        """The model in modal coordinates normalised to unit modal mass. unknowns: (parameters,), mode by mode."""
         each = unknowns.reshape(self.modes, -1)
         speed, ratio = self.speed_scale * np.exp(each[:, 0]), np.exp(each[:, 1])
         return MechanicalModel(
@@ -69,7 +72,7 @@ class ModalStructure:
         )
 
     def bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper limits (parameters,) of the unknowns, for a fit in this band; shapes have none."""
+        """Lower and upper bounds (parameters,) of the unknowns, for a fit in this band; shapes are unbounded."""
         low = np.full((self.modes, 2 + self.inputs + self.outputs), -np.inf)
         high = -low
         low[:, 0] = np.log(2 * np.pi * band_hz[0] / _WIDEST / self.speed_scale)
@@ -79,9 +82,9 @@ class ModalStructure:
 
 
 def find_balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
-    """(parameters,): factors that leave every response unchanged, and limit the input shape of each mode to half of the
-    slowest mode's. Sensors that are not collocated do not measure the motion at the commands, which leaves this scale
-    free; the limit keeps the mass there realistic."""
+    """(parameters,): factors on the unknowns that limit the norm of each flexible mode's input shape to `_SHARE` of the
+    largest of the rigid-body modes, and scale its output shape up by the reciprocal, so that no response changes.
+    Sensors that are not collocated do not determine this scale; the limit keeps the mass at the commands realistic."""
     each = unknowns.reshape(structure.modes, -1)
     pushed = slice(2, 2 + structure.inputs)
     size = np.maximum(np.linalg.norm(each[:, pushed], axis=1), 1e-300)

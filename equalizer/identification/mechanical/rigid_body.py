@@ -1,12 +1,12 @@
 """Fit of the device as a rigid body at two levels, and the equivalent viscous damping of its friction.
 
-A linear fit takes dry friction for damping. By the describing function, Coulomb friction of level F under a sinusoidal
-motion of amplitude X and angular frequency w acts like the damping
+A linear fit attributes dry friction to viscous damping. By the describing function, Coulomb friction of magnitude F (N)
+under a sinusoidal motion of amplitude X (m) and angular frequency w (rad/s) has the equivalent viscous damping
 
     c = 4 F / (pi w X)
 
-so c falls as 1 / X, and X grows in proportion to the force far above friction. With the fits at two levels, d1 at the
-stronger and d2 at the weaker, whose amplitudes have the ratio r > 1, the damping without friction is d1 - c with
+so c falls as 1 / X, and far above friction X grows in proportion to the command. With the damping d1 fitted at the
+stronger level and d2 at the weaker, and r > 1 the ratio of the commands, the damping without friction is d1 - c with
 
     c = (d2 - d1) / (r - 1)
 
@@ -27,16 +27,18 @@ from equalizer.signals.signal import FloatArray
 
 RIGID_OCTAVES = 3.0
 """Width in octaves of the lowest part of the band, in which the device moves as a rigid body and friction matters
-most. By hand."""
+most. Chosen by hand."""
 LEAST_MASS, LEAST_DAMPING = 0.02, 0.05
-"""Smallest tolerances, relative to the largest of all axes: how well a laboratory knows mass and damping. By hand."""
+"""Smallest tolerances of mass and damping, relative to the largest value of all axes. Chosen by hand: about as well as
+a laboratory knows them."""
 OF_FRICTION = 0.2
-"""Tolerance of the damping that was subtracted for friction, relative to it: friction is not exactly Coulomb's. By
-hand."""
+"""Tolerance of the subtracted equivalent damping, relative to it: real friction is not exactly Coulomb friction. Chosen
+by hand."""
 MOST_OFF = 0.8
-"""Largest share of the fitted damping that is subtracted, so that a damping above zero remains. By hand."""
+"""Largest share of the fitted damping that is subtracted, so that a damping above zero remains. Chosen by hand."""
 SPRING = 0.03
-"""Largest stiffness that the fit would not show, relative to the inertial force at the band's lower end. By hand."""
+"""Smallest tolerance of the stiffness, relative to the inertial force per displacement, m (2 pi f)², at the lower end f
+of the band: a weaker spring does not show in the fit. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,12 +46,13 @@ class RigidBody:
     """The device in the band where it moves as a rigid body, at the stronger level. Arrays are (m,): driven axes."""
 
     up_to_hz: float
+    """Upper end of that band."""
     mass: FloatArray
     """kg"""
     damping: FloatArray
-    """N s/m, with the equivalent damping of friction in it."""
+    """N s/m, as fitted: it contains the equivalent damping of friction."""
     of_friction: FloatArray
-    """N s/m, the equivalent damping of friction: at forces far above friction the damping is lower by it."""
+    """N s/m, equivalent damping c of friction at the stronger level, to be subtracted from `damping`."""
     tolerance: Tolerance
     """Tolerance of the whole model without the equivalent damping."""
 
@@ -58,7 +61,8 @@ def fit_rigid_body(
     fit: MechanicalFit, strong: Recording, weaker: Recording, settings: MechanicalFitSettings
 ) -> RigidBody:
     """Rigid fits of two recordings of the same device, at a stronger and a weaker level of the excitation. fit: that of
-    the whole band, whose tolerances are kept where they are wider. settings: its settings."""
+    the whole band, whose tolerances are kept where they are wider. settings: of `fit`. Raises MechanicalFitRefused
+    where a recording does not determine a rigid body."""
     low, high = fit.band_hz
     up_to_hz = min(high, low * 2**RIGID_OCTAVES)
     rigid = replace(
@@ -88,7 +92,7 @@ def remove_friction_damping(model: MechanicalModel, of_friction: FloatArray) -> 
 
 
 def _axis_values(model: MechanicalModel) -> FloatArray:
-    """(3, m): mass, damping and stiffness at each driven axis."""
+    """(3, m): mass, damping and stiffness at each driven axis, which are the first m coordinates of a fitted model."""
     parts: Sequence[FloatArray] = (model.mass, model.damping, model.stiffness)
     return np.array([np.diag(part)[: model.inputs] for part in parts])
 

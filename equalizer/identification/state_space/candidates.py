@@ -1,8 +1,10 @@
-"""Candidates of the search: starting models, each refined to a local optimum, and the choice among them.
+"""Candidate state-space models: starting models, each refined to a local optimum, and the choice among them.
 
-The cost of poles and shapes has many local minima. Subspace methods give starting models without iteration: one over
-frequency lines with a warped axis, one over time records (canonical variates), each for several horizons. Each is
-refined on lines averaged in bins, where the cost is smooth and cheap, then on all lines.
+The cost as a function of poles and output shapes has many local minima. Two subspace methods therefore give starting
+models without iteration, each for several horizons: frequency-domain identification on a warped frequency axis
+(`warped_subspace`), and canonical variate analysis of time records (`canonical_variate`). Each start is refined by
+maximum likelihood (`refinement`), first on lines averaged in bins, where the cost is smooth and cheap, then, in a
+narrow band, on all lines. Equations and references are in these modules.
 """
 
 from collections.abc import Sequence
@@ -27,23 +29,24 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray
 
 LINES_PER_BIN = 5
-"""Lines that are averaged to a bin for the first refinement, in a narrow band. By hand."""
+"""Least number of lines that are averaged to a bin for the first refinement, in a narrow band. Chosen by hand."""
 OCTAVE_SHARE = 1 / 40
-"""Width of a bin of a wide band, in octaves. By hand."""
+"""Width of a bin of a wide band, in octaves. Chosen by hand."""
 LARGEST_GAIN = 100.0
-"""Largest gain outside the band over that inside: above it, the model fits by cancellation of large modes.
-By hand."""
+"""Largest acceptable `outside_gain`: a model above it fits the lines by cancellation of large modes. Chosen by
+hand."""
 GAIN_POINTS = 2000
-"""Frequencies from 0 to half the sample rate at which the largest gain is looked for."""
+"""Number of frequencies from 0 to half the sample rate among which `outside_gain` takes the largest gain."""
 MOST_STEPS, LAST_STEPS = (60, 20, 20), 4
-"""Steps of the refinement on averaged lines, by pass, and on all lines at the end."""
+"""Most steps of the refinement: in each pass on averaged lines, and at the end on all lines."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Start:
-    """Starting model of a search."""
+    """Starting model of a search: poles and output shapes, without B and D."""
 
     name: str
+    """Method and horizon, in words."""
     form: ModalForm
 
 
@@ -54,15 +57,15 @@ class Candidate:
     name: str
     fitted: FittedForm
     cost: float
-    """Squared residual over noise variance, mean over all entries of all lines: about 1 where only noise is left."""
+    """Squared residual over noise variance, mean over all entries of all lines: about 1 where the residual is noise."""
     outside_gain: float
-    """Largest gain outside the band over the largest inside."""
+    """Largest gain at any frequency over the largest on the fitted lines, see `outside_gain`."""
     radius: Radius
-    """Largest magnitude of a pole during the search."""
+    """Largest magnitude of a pole (discrete time) that the search allows."""
 
     @property
     def sane(self) -> bool:
-        """Whether its gain outside the band is acceptable."""
+        """Whether the gain outside the band is at most `LARGEST_GAIN` times that on the fitted lines."""
         return self.outside_gain <= LARGEST_GAIN
 
 
@@ -83,7 +86,8 @@ def subspace_start(lines: WeightedLines, settings: IdentificationSettings, longe
 def record_starts(
     recordings: Sequence[Recording], lines: WeightedLines, settings: IdentificationSettings
 ) -> tuple[Start, ...]:
-    """Starts by canonical variate analysis of time records; none where the band is too wide for decimation."""
+    """Starting models by canonical variate analysis of time records, one per horizon that has enough rows and samples;
+    none where the band is too wide for decimation."""
     factor = decimation_factor(lines.sample_rate_hz, settings.band_hz[1])
     if factor < 2:
         return ()
@@ -100,7 +104,7 @@ def record_starts(
 
 
 def refine_start(start: Start, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
-    """Candidate from a start: B and D by linear least squares, then refined as in `refine_candidate`."""
+    """Candidate from a starting model: B and D by linear least squares, then refined as in `refine_candidate`."""
     radius = largest_radius(settings.decay_s, lines.sample_rate_hz)
     return refine_candidate(start.name, complete_form(start.form, lines), lines, settings, radius)
 
@@ -108,7 +112,8 @@ def refine_start(start: Start, lines: WeightedLines, settings: IdentificationSet
 def refine_candidate(
     name: str, found: FittedForm, lines: WeightedLines, settings: IdentificationSettings, radius: Radius
 ) -> Candidate:
-    """Refine a model on bins, which are formed anew about each pass's result, then on all lines of a narrow band."""
+    """Refine a model on bins, formed anew about the result of each pass, then on all lines if the band is narrow.
+    radius: largest magnitude of a pole."""
     for steps in MOST_STEPS:
         found = refine(found.form, bins_about(found, lines, settings), radius, steps)
     if not settings.wide:
@@ -118,24 +123,27 @@ def refine_candidate(
 
 
 def bins_about(found: FittedForm, lines: WeightedLines, settings: IdentificationSettings) -> WeightedLines:
-    """The lines averaged in bins, about the response of an approximate model."""
+    """The lines averaged in bins. The difference from the model's response is averaged, which varies less within a bin
+    than the response."""
     bins = group_lines(lines, 1, OCTAVE_SHARE) if settings.wide else group_lines(lines, LINES_PER_BIN, 0.0)
     centres = np.exp(2j * np.pi * bin_centres_hz(lines, bins) / lines.sample_rate_hz)
     return average_bins(lines, bins, found.response(lines.z), found.response(centres))
 
 
 def outside_gain(found: FittedForm, lines: WeightedLines) -> float:
-    """The largest response anywhere over the largest on the lines."""
+    """Largest gain at `GAIN_POINTS` frequencies from 0 to half the sample rate over the largest on the lines. The gain
+    is the largest singular value of the response matrix."""
     every = np.exp(1j * np.linspace(0, np.pi, GAIN_POINTS))
     return float(_largest_gain(found.response(every)) / _largest_gain(found.response(lines.z)))
 
 
 def choose_best(found: Sequence[Candidate]) -> Candidate:
-    """The candidate of lowest cost among those with acceptable gain outside the band; where there is none, that of the
-    smallest such gain."""
+    """The candidate of lowest cost among those with acceptable gain outside the band; if none is acceptable, the
+    candidate with the smallest gain outside the band. Raises ValueError for an empty sequence."""
     sane = [each for each in found if each.sane]
     return min(sane, key=lambda each: each.cost) if sane else min(found, key=lambda each: each.outside_gain)
 
 
 def _largest_gain(response: ComplexArray) -> float:
+    """Largest singular value of a response (lines, outputs, inputs), over all lines."""
     return float(np.linalg.norm(response, ord=2, axis=(1, 2)).max())

@@ -1,7 +1,11 @@
-"""Poles and output shapes from time records: canonical variate analysis (Larimore 1990) of several records at once.
+"""Poles and output shapes from several time records by canonical variate analysis (CVA), a subspace identification
+method (Larimore, Canonical variate analysis in identification, filtering, and adaptive control, IEEE CDC 1990).
 
-Each record is reduced to the triangular factor of its own QR decomposition, and the factors are stacked: no row mixes
-samples of two records, and the cost is proportional to the number of records.
+The state is the part of the past (commands and responses) that best predicts the future responses, once the effect of
+future commands is removed: canonical correlations between past and future. Each row of the data matrix [future
+commands, past, future responses] belongs to a sampling instant. Each record is reduced to the triangular factor of the
+QR decomposition of its data matrix, and the factors are stacked and reduced again: no row mixes samples of two records,
+and the cost is proportional to the number of records.
 """
 
 from collections.abc import Sequence
@@ -15,10 +19,11 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 RATE_OVER_BAND = 3.5
-"""Records are decimated to about this many samples per period of the band's upper end."""
+"""Records are decimated to at least this many samples per period of the band's upper end, and to hardly more."""
 LEAST_SAMPLES = 4
-"""Least number of samples per row of the stacked past and future, for a record to be used."""
+"""Least length of a record that is used, in samples times the number of records, per column of past and future."""
 _SILENT_KINDS = ("rest", "free")
+"""Kinds of segments without a command."""
 
 
 def decimation_factor(sample_rate_hz: float, high_hz: float) -> int:
@@ -27,8 +32,8 @@ def decimation_factor(sample_rate_hz: float, high_hz: float) -> int:
 
 
 def driven_records(recordings: Sequence[Recording], factor: int) -> list[FloatArray]:
-    """Commands and responses side by side, (n, m + p) each: every driven segment that is not kept for a test, without
-    its mean, decimated. Segments with missing samples are left out."""
+    """Commands and responses side by side, (n, m + p) each: every driven segment that is not held out for a test, with
+    its mean removed, then low-pass filtered and decimated by `factor`. Segments with missing samples are left out."""
     records = []
     for recording in recordings:
         both = np.hstack([recording.command.samples, recording.response.samples])
@@ -42,9 +47,10 @@ def driven_records(recordings: Sequence[Recording], factor: int) -> list[FloatAr
 
 
 def canonical_variate(records: Sequence[FloatArray], inputs: int, horizon: int) -> FloatArray | None:
-    """Extended observability matrix (horizon p, horizon p), strongest direction first; None with too few samples.
+    """Extended observability matrix (horizon p, horizon p), strongest canonical correlation first; None with too few
+    samples.
 
-    records: (n, m + p) each, commands first; horizon: past and future samples.
+    records: (n, m + p) each, commands first; inputs: m; horizon: number of past samples, and of future samples.
     """
     rows = 2 * horizon * records[0].shape[1] if records else 0
     long = [record for record in records if len(record) > LEAST_SAMPLES * rows / max(len(records), 1) + 2 * horizon]
@@ -55,19 +61,23 @@ def canonical_variate(records: Sequence[FloatArray], inputs: int, horizon: int) 
     p = records[0].shape[1] - inputs
     known, future = horizon * inputs, triangle.shape[1] - horizon * p
     by_past, by_chance = triangle[known:future, future:], triangle[future:, future:]
+    # Covariance L L' of the future responses, given the future commands: the part that the past predicts, and the rest.
     spread = by_past.T @ by_past + by_chance.T @ by_chance
     spread[np.diag_indices_from(spread)] += 1e-13 * np.trace(spread)
     root = np.linalg.cholesky(spread)
+    # Canonical correlations are the singular values of L^-1 by_past', because the past is orthonormal in the QR basis.
     vectors, correlations, _ = np.linalg.svd(np.linalg.solve(root, by_past.T), full_matrices=False)
     return np.asarray(root @ (vectors * np.sqrt(correlations)), dtype=np.float64)
 
 
 def _qr_triangle(rows: FloatArray) -> FloatArray:
+    """Triangular factor R of the QR decomposition; R'R equals the products of the rows."""
     return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
 
 
 def _past_and_future(record: FloatArray, inputs: int, horizon: int) -> FloatArray:
-    """Future commands, then the past of both, then future responses: a row per instant."""
+    """(instants, 2 horizon m + 2 horizon p): future commands, then past commands and responses, then future responses,
+    with one row per sampling instant."""
     windows = np.lib.stride_tricks.sliding_window_view(record, 2 * horizon, axis=0).transpose(0, 2, 1)
     past, future = windows[:, :horizon], windows[:, horizon:]
     instants = len(windows)
@@ -81,11 +91,12 @@ def _past_and_future(record: FloatArray, inputs: int, horizon: int) -> FloatArra
 
 
 def poles_and_shapes(observed: FloatArray, outputs: int, order: int, factor: int, radius: float) -> ModalForm:
-    """Modal form at the full rate: a pole of the decimated records becomes its factor-th root. radius: largest pole at
-    the full rate."""
+    """Modal form of a model of this order at the full rate. The poles are the eigenvalues of the matrix A that shifts
+    the observability matrix by one sample, in least squares. A pole of the decimated records becomes its factor-th
+    root. observed: result of `canonical_variate`; radius: largest magnitude of a pole at the full rate."""
     observability = observed[:, :order]
     values, vectors = np.linalg.eig(np.linalg.lstsq(observability[:-outputs], observability[outputs:], rcond=None)[0])
     slow: ComplexArray = stabilise_poles(values, radius**factor)
-    # A negative real pole has no real root; the positive pole with the same decay is used.
+    # A negative real pole may have no real factor-th root; the positive pole with the same decay is used.
     turned = np.where((slow.imag == 0) & (slow.real < 0), -slow, slow)
     return from_poles(stabilise_poles(turned ** (1 / factor), radius), observability[:outputs] @ vectors)

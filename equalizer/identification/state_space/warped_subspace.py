@@ -1,8 +1,11 @@
 """Poles and output shapes from a frequency response, by subspace identification in the frequency domain.
 
-After McKelvey, Akçay and Ljung (1996), with two changes that noisy data need: an all-pass map warps the frequency axis
-until the band fills the unit circle, and block rows are whitened before their singular values are compared. The horizon
-is short, because the noise of a long one hides the order.
+Method: McKelvey, Akçay and Ljung, IEEE Trans. Autom. Control 41:960 (1996), with two changes for noisy data. The
+bilinear (all-pass) map zeta = (z - c) / (1 - c z) warps the frequency axis, so that the centre of the band lies at a
+quarter turn of the unit circle; and block rows are whitened before their singular values are compared. With p outputs
+and powers zeta^q, q < horizon, the rows zeta^q G are projected onto the complement of the input's rows; the left
+singular vectors of the result span the extended observability matrix, whose shift structure gives the poles. The
+horizon is short, because the noise of a long horizon hides the order.
 """
 
 from dataclasses import dataclass
@@ -20,32 +23,35 @@ class Subspace:
     """Extended observability matrix with its singular values, before an order is chosen."""
 
     directions: FloatArray
-    """(horizon p, horizon p): columns span the extended observability matrix, noise coloured back."""
+    """(horizon p, horizon p): columns span the extended observability matrix, in order of falling singular value; the
+    whitening is undone."""
     singular_values: FloatArray
-    """(horizon p,) of the whitened data: about 1 and falling slowly where there is only noise."""
+    """(horizon p,): of the whitened data; about 1 and falling slowly where there is only noise."""
     outputs: int
+    """p: number of outputs."""
     warp: float
+    """c of the bilinear map."""
 
 
 def default_horizon(order: int, outputs: int) -> int:
-    """Block rows: just enough for the order, and a few more to average over."""
+    """Number of block rows: as many as the order needs, and three more to average noise."""
     return -(-order // outputs) + 3
 
 
 def warp_coefficient(centre_hz: float, sample_rate_hz: float) -> float:
-    """c of zeta = (z - c) / (1 - c z), which puts the centre at a quarter turn."""
+    """c of the map zeta = (z - c) / (1 - c z) that puts centre_hz at a quarter turn of the unit circle."""
     half = np.pi * centre_hz / sample_rate_hz
     return float((1 - np.tan(half)) / (1 + np.tan(half)))
 
 
 def estimate_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> Subspace:
-    """Subspace of a measured response, warped about centre_hz. horizon: block rows."""
+    """Subspace of a measured response, warped about centre_hz. horizon: number of block rows."""
     c = warp_coefficient(centre_hz, lines.sample_rate_hz)
     zeta = (lines.z - c) / (1 - c * lines.z)
     powers = zeta[:, None] ** np.arange(horizon)
     p, m = lines.response.shape[1:]
-    # The noise is modelled as a factor per output times one per line and input: then columns can be scaled to equal
-    # noise.
+    # The noise is modelled as a factor per output times a factor per line and input, so that dividing by both gives
+    # all entries equal noise.
     deviation = 1 / lines.weight
     of_output = np.exp(np.log(deviation).mean(axis=(0, 2)))
     of_column = np.exp(np.log(deviation / of_output[:, None]).mean(axis=1))
@@ -60,7 +66,8 @@ def estimate_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> S
 
 
 def _project_out_inputs(entered: ComplexArray, came_out: ComplexArray) -> FloatArray:
-    """(horizon p, horizon p): the outputs' rows with the span of the inputs' rows projected out."""
+    """(horizon p, horizon p): the outputs' rows with the span of the inputs' rows projected out, compressed by an LQ
+    decomposition of real and imaginary parts."""
     stacked = np.concatenate([entered, came_out])
     real = np.concatenate([stacked.real, stacked.imag], axis=1)
     upper = np.asarray(np.linalg.qr(real.T, mode="r"))
@@ -68,7 +75,8 @@ def _project_out_inputs(entered: ComplexArray, came_out: ComplexArray) -> FloatA
 
 
 def poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm:
-    """A model's poles (all within the radius) and outputs, of the `order` strongest directions."""
+    """Poles in the z plane (all within the radius) and output shapes of a model of this order, from the strongest
+    directions: least-squares solution of the shift equation, then the inverse map z = (zeta + c) / (1 + c zeta)."""
     observed = subspace.directions[:, :order]
     p, c = subspace.outputs, subspace.warp
     size = np.linalg.norm(observed.reshape(-1, p, order), axis=(0, 2))

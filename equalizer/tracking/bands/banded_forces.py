@@ -1,4 +1,7 @@
-"""Result of the banded equalizer: forces, the accelerations they are predicted to give, and their cost."""
+"""Result of the banded equalizer (`BandedEqualizer.play`): forces, predicted accelerations, and cost of the force cap.
+
+N: rows, m: axes of force, p: axes of acceleration. Forces in N, accelerations in m/s², one row per sample.
+"""
 
 from dataclasses import dataclass
 
@@ -13,35 +16,38 @@ from equalizer.tracking.lqr.limits import Peaks
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedForces:
-    """Forces per row: the rows of the wanted acceleration, and the run-in and run-out around them; see
-    `rows_of_wanted`."""
+    """Forces and predicted accelerations. The N rows are those of the wanted acceleration, shifted by
+    `latency_samples`, and the run-in and run-out around them; see `rows_of_wanted`."""
 
     commands: FloatArray
-    """(N, m), N: commands, to which the rendered spring adds its force."""
+    """(N, m), N: forces to command. The rendered spring of the device's control loop adds its own force to them."""
     entering: FloatArray
-    """(N, m), N: force that enters the device, the spring's included."""
+    """(N, m), N: total force on the device, commands and spring together."""
     by_band: tuple[FloatArray, FloatArray, FloatArray]
-    """(N, m) each: low, middle, high part of `entering`"""
+    """(N, m), N: the parts of `entering` of the low, middle and high band."""
     predicted: tuple[FloatArray, FloatArray, FloatArray]
-    """m/s², predicted acceleration of each band, (N, p): by the high band's response where there is one, which also
-    covers what the low and middle forces do outside their bands; else by each band's own model."""
+    """(N, p), m/s²: predicted acceleration due to the forces of each band. Where there is a high band, its response is
+    used for all three, because it covers the effect of a band's forces outside that band; else each band's model."""
     bands: Bands
-    """The wanted acceleration of each band."""
+    """The wanted acceleration, split into bands."""
     latency_samples: int
-    """Samples by which `commands` lags the wanted rows when these arrive one by one."""
+    """Rows before that of the first wanted sample: the delay of the band split and, unless it is causal, the run-in."""
     peaks: Peaks | None
-    """Force peaks of `entering`; None without a cap."""
+    """Largest norms of `entering`, against the cap; None without a cap."""
     loss: TrackingLoss | None
-    """Loss of tracking in the middle band due to the cap; None where the cap did not act."""
+    """Loss of tracking in the middle band due to the force cap; None where no cap constrained it."""
     motion: SlowMotion | None
+    """Planned motion of the low band; None without a low band."""
     high: HighBandForces | None
+    """Forces of the high band and their direction; None without a high band."""
     stylus: StylusShare | None
+    """Share of a stylus actuator; None without one."""
 
     @property
     def predicted_total(self) -> FloatArray:
-        """(N, p), m/s²"""
+        """(N, p), m/s²: predicted acceleration due to all forces."""
         return self.predicted[0] + self.predicted[1] + self.predicted[2]
 
     def rows_of_wanted(self, samples: int) -> slice:
-        """Slice of the rows that correspond to the wanted rows, where all are known beforehand."""
+        """Slice of the rows that correspond to the wanted acceleration. samples: number of its rows."""
         return slice(self.latency_samples, self.latency_samples + samples)

@@ -1,4 +1,13 @@
-"""The low band: a slow motion is planned, and its forces follow from the inverse dynamics of a rigid model."""
+"""Low band of a tracked acceleration: plan a slow motion, then compute its forces by inverse dynamics.
+
+Integrating a wanted acceleration twice would let the handle drift out of its workspace. A high-pass filter of corner w
+(rad/s) limits the travel. The filtered position x, velocity and acceleration are consistent, and give the force
+
+    F = M x'' + D x' + K x        of a rigid model (`rigid_model`)
+
+The filter is s² / (s² - w²), without phase error, where the whole acceleration is known beforehand; otherwise it is
+the causal s² / (s + w)².
+"""
 
 from dataclasses import dataclass
 
@@ -9,32 +18,33 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.bands.rigid_model import RigidModel
 
 CORNER_HZ = 0.5
-"""High-pass corner: a constant acceleration would move the handle out of its workspace."""
+"""Corner of the high-pass filter: lower frequencies would move the handle out of its workspace."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlowMotion:
-    """Each (N, m), and consistent: velocity and acceleration are the position's derivatives."""
+    """Position, velocity and acceleration, (N, m) each; consistent, as each is the derivative of the one before."""
 
     position_m: FloatArray
     velocity_m_s: FloatArray
     acceleration: FloatArray
-    """m/s²: the high-passed acceleration that is played."""
+    """m/s²: the wanted acceleration after the high-pass filter."""
 
     @property
     def travel_m(self) -> float:
-        """Largest distance from the starting position."""
+        """Largest distance from the origin, in m."""
         return float(np.linalg.norm(self.position_m, axis=1).max(initial=0.0))
 
 
 def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
     """Plan the slow motion of the low band by a zero-phase filter. wanted: (N, m), m/s², known beforehand and zero at
-    both ends.
+    both ends. Raises ValueError for a corner that is not between zero and half the sample rate.
 
-    Two-sided, so that there is no phase error: x = a / (s² - w²), an exponential kernel that decays both ways. Of the
-    wanted acceleration f² / (f² + corner²) is played.
+    x = a / (s² - w²), a convolution with a two-sided exponential kernel. The filter from wanted to planned acceleration
+    is real, f² / (f² + corner²), so that there is no phase error.
     """
     a, corner = np.asarray(wanted, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
+    # Zeros over eight time constants, so that the kernel does not wrap around the ends.
     run = int(np.ceil(8 * sample_rate_hz / corner))
     padded = np.pad(a, ((run, run), (0, 0)))
     s = 2j * np.pi * np.fft.rfftfreq(len(padded), 1 / sample_rate_hz)[:, None]
@@ -45,20 +55,23 @@ def plan_motion(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CO
 
 def plan_motion_causally(wanted: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
     """Plan the slow motion of the low band by a causal filter. wanted: (N, m), m/s², from rest at the first row, as
-    after a contact. x = a / (s + w)²: it leads by 2 atan(corner / f)."""
+    after a contact. x = a / (s + w)²: the planned acceleration leads the wanted by 2 atan(corner / f). Raises
+    ValueError for a corner that is not between zero and half the sample rate."""
     a, corner = np.asarray(wanted, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
+    # 1 / (s + w) by the bilinear transform, s = c (1 - z^-1) / (1 + z^-1).
     c = 2 * sample_rate_hz
     integral = np.array([1.0, 1.0]) / (c + corner), np.array([1.0, (corner - c) / (c + corner)])
     velocity_like = lfilter(*integral, a, axis=0)
     position = lfilter(*integral, velocity_like, axis=0)
-    # s / (s + w) = 1 - w / (s + w), so that the three are derivatives of each other to rounding.
+    # s / (s + w) = 1 - w / (s + w), applied once for the velocity and twice for the acceleration: all three signals are
+    # derivatives of each other to rounding.
     velocity = velocity_like - corner * position
     return SlowMotion(position, velocity, a - 2 * corner * velocity_like + corner**2 * position)
 
 
 def low_band_forces(motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float) -> FloatArray:
-    """Forces (N, m) in N by inverse dynamics along the motion, advanced by the rigid model's delay to first order,
-    which is enough for a slow band."""
+    """Forces (N, m) in N by inverse dynamics along the motion, advanced by the rigid model's delay and the half
+    sample of the hold, to first order (Taylor), which is enough for a slow band."""
     early = rigid.delay_s + 0.5 / sample_rate_hz
     x, v, a = motion.position_m, motion.velocity_m_s, motion.acceleration
     later_x, later_v = x + early * v, v + early * a

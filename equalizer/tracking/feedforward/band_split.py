@@ -1,8 +1,9 @@
-"""Complementary filters: a signal split into a low, a middle and a high band that add up to it again.
+"""Complementary filters (crossovers): split a signal into low, middle and high bands whose sum is the signal.
 
-The split comes before the forces are solved for: a model is not valid outside its band, and where the device's gain is
-high there, a little content outside causes a large error. Two forms: symmetric filters, steep and without phase error
-but late, for what is known beforehand; causal ones, without latency but shallow, for what begins at a contact.
+The split precedes the inversion of a model, because the model is not valid outside its band: where the device's gain is
+high there, even small content outside the band causes a large error. Two forms: linear-phase FIR filters, steep and
+without phase error but with a latency, for signals known in advance; causal filters, without latency but with shallow
+slopes, for signals that begin at a contact.
 """
 
 from dataclasses import dataclass
@@ -15,19 +16,20 @@ from scipy.signal import firwin, freqz, kaiser_beta, lfilter, oaconvolve
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 STOPBAND_DB = 60.0
-"""Attenuation of the filters outside their band."""
+"""Attenuation (dB) of the linear-phase filters in their stopband."""
 CAUSAL_ORDER = 3
-"""Odd, so that both sides of a crossover fall off alike: 12 dB per octave."""
+"""Order of the causal filters. An odd order gives both sides of a crossover the same slope: 12 dB per octave for 3."""
 
 
 @dataclass(frozen=True, slots=True)
 class BandEdges:
-    """Crossover frequencies, at which both bands have equal gain. None = no such band; its neighbour extends to the
-    end."""
+    """Crossover frequencies (Hz), at which adjacent bands have equal gain. None: that band does not exist, and the
+    middle band extends to the end of the spectrum. Raises ValueError for edges that are not positive and rising."""
 
     low_hz: float | None = 4.0
-    """Lower band edge. The default is 1 Hz below the model's band (5 Hz), so that the model plays the whole band."""
+    """Lower band edge. The default is 1 Hz below the model's band (5 Hz), so that the middle band keeps all of it."""
     high_hz: float | None = 36.0
+    """Upper band edge."""
 
     def __post_init__(self) -> None:
         for name in ("low_hz", "high_hz"):
@@ -40,7 +42,7 @@ class BandEdges:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bands:
-    """Three arrays of one shape; low + middle + high is the input, delayed by `latency_samples`."""
+    """Three arrays (N, channels); low + middle + high is the input, delayed by `latency_samples`."""
 
     low: FloatArray
     middle: FloatArray
@@ -49,18 +51,19 @@ class Bands:
 
     @property
     def total(self) -> FloatArray:
+        """Sum of the bands: the delayed input, (N, channels)."""
         return self.low + self.middle + self.high
 
 
 @dataclass(frozen=True, eq=False)
 class LinearPhaseSplit:
-    """Symmetric (linear-phase) filters: no phase error, but a latency of `latency_ms`, and content spreads by it both
-    ways."""
+    """Linear-phase FIR filters (Kaiser window): no phase error, but a latency of `latency_ms`, by which content also
+    spreads before and after its time. Raises ValueError for an unusable transition width or sample rate."""
 
     edges: BandEdges
     sample_rate_hz: float
     transition_hz: float = 2.0
-    """Width of each crossover; it determines the latency."""
+    """Width of each crossover's transition band; the latency is inversely proportional to it."""
 
     def __post_init__(self) -> None:
         _check_rate(self.edges, self.sample_rate_hz)
@@ -72,7 +75,8 @@ class LinearPhaseSplit:
 
     @property
     def latency_samples(self) -> int:
-        """Half the length of the filters, by Kaiser's rule for STOPBAND_DB."""
+        """Half the filter order, by Kaiser's formula: order = (A - 7.95) / (2.285 width), A = STOPBAND_DB, width in
+        rad."""
         if self.edges.low_hz is None and self.edges.high_hz is None:
             return 0
         width = 2 * np.pi * self.transition_hz / self.sample_rate_hz
@@ -80,11 +84,12 @@ class LinearPhaseSplit:
 
     @property
     def latency_ms(self) -> float:
+        """Latency in ms."""
         return 1e3 * self.latency_samples / self.sample_rate_hz
 
     @cached_property
     def filters(self) -> FloatArray:
-        """(3, taps): low, middle, high; they add up to a delayed impulse."""
+        """(3, taps): impulse responses of low, middle and high; their sum is an impulse delayed by the latency."""
         taps = 2 * self.latency_samples + 1
         everything, nothing = np.zeros(taps), np.zeros(taps)
         everything[self.latency_samples] = 1.0
@@ -93,7 +98,8 @@ class LinearPhaseSplit:
         return np.stack([low, below_high - low, everything - below_high])
 
     def split(self, wanted: FloatArray) -> Bands:
-        """wanted: (N, channels). The bands have N + 2 latency_samples rows: the filters' run-in and run-out too."""
+        """Split wanted (N, channels). The bands have N + 2 latency_samples rows, with the filters' run-in and
+        run-out."""
         low_taps, _, high_taps = self.filters
         late = np.pad(np.asarray(wanted, dtype=np.float64), ((self.latency_samples,) * 2, (0, 0)))
         low = oaconvolve(wanted, low_taps[:, None], axes=0)
@@ -101,12 +107,13 @@ class LinearPhaseSplit:
         return Bands(low, late - low - high, high, self.latency_samples)
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, 3): real gains of low, middle and high, without the latency."""
+        """(lines, 3): gains of low, middle and high with the latency removed, which are real up to rounding."""
         turned = np.exp(2j * np.pi * np.asarray(frequency_hz) * self.latency_samples / self.sample_rate_hz)
         parts = [freqz(taps, worN=frequency_hz, fs=self.sample_rate_hz)[1] for taps in self.filters]
         return np.asarray(np.stack(parts, axis=1) * turned[:, None])
 
     def _low_pass_filter(self, edge_hz: float) -> FloatArray:
+        """(taps,): low-pass by the window method, with a gain of 1/2 at the edge."""
         window = ("kaiser", kaiser_beta(STOPBAND_DB))
         taps = firwin(2 * self.latency_samples + 1, edge_hz, window=window, fs=self.sample_rate_hz)
         return np.asarray(taps)
@@ -114,17 +121,18 @@ class LinearPhaseSplit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CausalSplit:
-    """Complementary causal filters that add up to the input without delay. Each band has a phase, see `phase_deg`.
+    """Complementary causal filters whose sum is the input without delay. Each band has a phase, see `phase_deg`.
 
-    With q a low pass of one pole, (q + (1 - q))^order is 1: the terms with the higher powers of 1 - q are the band
-    above the crossover, the others the band below. Steep bands that add up to the input overlap and partly cancel near
-    a crossover, where each exceeds the input (`largest_gain`), so that errors of single bands no longer cancel. With a
-    wide-band model, playing without a split is better from a contact on.
+    With q a first-order low-pass, (q + (1 - q))^order = 1. Its binomial terms with the higher powers of 1 - q make the
+    band above the crossover, the others the band below. Near a crossover the gain of a single band may exceed 1
+    (`largest_gain`); the bands partly cancel there, and errors that differ between bands do not. With a wide-band
+    model, playing without a split is better from a contact on. Raises ValueError for an even order or a low rate.
     """
 
     edges: BandEdges
     sample_rate_hz: float
     order: int = CAUSAL_ORDER
+    """Odd; each side of a crossover falls off by 3 (order + 1) dB per octave."""
 
     def __post_init__(self) -> None:
         _check_rate(self.edges, self.sample_rate_hz)
@@ -133,14 +141,16 @@ class CausalSplit:
 
     @property
     def latency_samples(self) -> int:
+        """Always 0."""
         return 0
 
     @property
     def latency_ms(self) -> float:
+        """Always 0."""
         return 0.0
 
     def split(self, wanted: FloatArray) -> Bands:
-        """wanted: (N, channels), from rest."""
+        """Split wanted (N, channels), with filters that start at rest; the bands have N rows."""
         x = np.asarray(wanted, dtype=np.float64)
         high = self._high_pass(self.edges.high_hz, x) if self.edges.high_hz else np.zeros_like(x)
         rest = x - high
@@ -155,7 +165,7 @@ class CausalSplit:
         return np.asarray(np.stack([low, 1 - low - high, high], axis=1))
 
     def phase_deg(self, frequency_hz: FloatArray) -> FloatArray:
-        """(lines, 3): phase lead (+) or lag (-) of each band against the input."""
+        """(lines, 3): phase of each band relative to the input in degrees; positive is a lead."""
         return np.asarray(np.degrees(np.angle(self.response(frequency_hz))))
 
     @property
@@ -165,6 +175,7 @@ class CausalSplit:
         return float(np.abs(self.response(lines)).max())
 
     def _high_pass(self, edge_hz: float, x: FloatArray) -> FloatArray:
+        """Band of x (N, channels) above an edge: the binomial terms with at least (order + 1) / 2 factors 1 - q."""
         pole = self.one_pole(edge_hz)
         total = np.zeros_like(x)
         for power in range((self.order + 1) // 2, self.order + 1):
@@ -177,17 +188,19 @@ class CausalSplit:
         return total
 
     def _gain_above(self, edge_hz: float, frequency_hz: FloatArray) -> ComplexArray:
+        """(lines,): complex gain of `_high_pass`."""
         q = freqz(*self.one_pole(edge_hz), worN=frequency_hz, fs=self.sample_rate_hz)[1]
         powers = range((self.order + 1) // 2, self.order + 1)
         return np.asarray(sum(comb(self.order, j) * (1 - q) ** j * q ** (self.order - j) for j in powers))
 
     def one_pole(self, edge_hz: float) -> tuple[FloatArray, FloatArray]:
-        """Numerator and denominator, each (2,), of q."""
+        """Numerator and denominator, each (2,), of q: 1 / (1 + s / w) by the bilinear transform, exact at the edge."""
         w = np.tan(np.pi * edge_hz / self.sample_rate_hz)
         return np.array([w, w]) / (1 + w), np.array([1.0, (w - 1) / (1 + w)])
 
 
 def _check_rate(edges: BandEdges, sample_rate_hz: float) -> None:
+    """Raise ValueError unless the sample rate exceeds twice the highest edge."""
     highest = max(edges.low_hz or 0.0, edges.high_hz or 0.0)
     if not (np.isfinite(sample_rate_hz) and sample_rate_hz > 2 * highest):
         raise ValueError(f"sample_rate_hz is {sample_rate_hz}; it must be above twice the highest edge, {highest:g} Hz")

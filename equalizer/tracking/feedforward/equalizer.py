@@ -1,4 +1,8 @@
-"""Interface of an equalizer, through which a stimulus passes on its way to the device."""
+"""Interface of an equalizer, and the identity as its trivial form.
+
+An equalizer computes the commands (forces) that produce a wanted signal at the handle. A study plays every stimulus
+through an equalizer, so that the same protocol runs with a commanded force or with a wanted acceleration.
+"""
 
 from typing import Protocol
 
@@ -6,11 +10,11 @@ from equalizer.signals.signal import FloatArray, Signal
 
 
 class Equalizer(Protocol):
-    """Turns a signal wanted at the handle into commands."""
+    """Computes commands from the signal that is wanted at the handle."""
 
     @property
     def name(self) -> str:
-        """Name that a session's log states for it: "none (commanded force)", or kind, order and band of the model."""
+        """Name of the equalizer in a session's log: "none (commanded force)", or kind, order and band of the model."""
         ...
 
     @property
@@ -19,12 +23,13 @@ class Equalizer(Protocol):
         ...
 
     def periodic(self, wanted: Signal) -> Signal:
-        """One loop of the command, for one loop of the wanted signal. Both are whole periods and are repeated."""
+        """One loop (N, channels) of the command for one loop of the wanted signal. Both loops are a whole number of
+        periods long and are repeated."""
         ...
 
     def onset(self, wanted: Signal, envelope: FloatArray) -> Signal | None:
-        """The command that leads from rest into the loop while the wanted signal, one loop, rises by `envelope`,
-        shape (ticks,), 0 to 1; None where the loop's command times the envelope does that."""
+        """The command (ticks, channels) from rest into the loop, while the wanted signal (one loop) is multiplied by
+        `envelope` (ticks,), which rises from 0 to 1. None: the loop's command times the envelope is to be used."""
         ...
 
 
@@ -41,4 +46,5 @@ class Identity:
         return wanted
 
     def onset(self, wanted: Signal, envelope: FloatArray) -> None:
+        # The command is the wanted force times the envelope.
         return None

@@ -1,4 +1,8 @@
-"""Periodic commands: the regularised steady-state inverse of a model, line by line."""
+"""Commands for periodic outputs: the regularised (Tikhonov) inverse of a model's frequency response, line by line.
+
+In the steady state every spectral line is independent: with the response G from forces to outputs and the weight w, the
+forces H y with H = (G* G + w I)^-1 G* minimise |G f - y|² + w |f|² for the wanted output y.
+"""
 
 import numpy as np
 
@@ -8,11 +12,11 @@ from equalizer.signals.signal import ComplexArray, FloatArray, Signal
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
 WEIGHT = 1e-4
-"""Weight of |force|² against |acceleration error|²: costs a thousandth of a decibel where the device's gain is 1 m/s²
-per N, and keeps the force finite at antiresonances."""
+"""Weight w of |force|² against |acceleration error|², (m/s² per N)². It costs a thousandth of a decibel where
+the device's gain is 1 m/s² per N, and keeps the force finite at antiresonances."""
 
 EMPTY = 1e-9
-"""Lines below this share of the largest one count as rounding."""
+"""Fraction of the largest spectral line below which a line counts as a rounding error and gets no force."""
 
 
 class OutsideBandError(ValueError):
@@ -22,7 +26,8 @@ class OutsideBandError(ValueError):
 def inverse_response(
     model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
 ) -> ComplexArray:
-    """Forces per wanted output, (lines, m, p): least squares with `weight` on the force that enters the plant."""
+    """Commands per wanted output, (lines, m, p), N per unit of the output. `weight` acts on the total force that enters
+    the plant, H of the module docstring; the part of it that the virtual spring supplies is subtracted."""
     G = model_response(model, frequency_hz)
     H = invert_regularised(G, weight)
     if spring == NO_SPRING:
@@ -42,7 +47,8 @@ def periodic_command(
 ) -> Signal:
     """One period of forces (N, m) for one period of wanted outputs (N, p).
 
-    Raises OutsideBandError where something is wanted outside the model's band, ValueError for other rates or units.
+    Raises OutsideBandError where something is wanted outside the model's band, ValueError for a rate, a number of
+    channels or units other than the model's.
     """
     check_wanted(model, wanted)
     n = len(wanted)

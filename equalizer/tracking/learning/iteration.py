@@ -1,13 +1,15 @@
-"""Iterative learning control: play, measure, correct the forces, until only noise is left.
+"""Iterative learning control: play forces, measure the response, correct the forces, until the error is noise only.
 
-    u <- u + beta L(band(r - y)),  L: inverse of the model
+    u <- u + beta L(band(r - y)),        beta = min(beta_0 / (1 + setbacks), 1 - (noise / residual)²)
 
-The correction is the error's share that is not noise, 1 - (noise / residual)²: nearly all of a large error, less near
-the noise floor, so that noise is not learned (with a fixed gain it is, and good initial forces get worse). The gain
-falls as 1, 1/2, 1/3 ... with every repeat that increased the error; the best forces are kept.
+with forces u, wanted motion r, measured motion y and the inverse L of the model; the survey by Bristow, Tharayil and
+Alleyne that `convergence` cites describes the method. The second bound of beta is the share of the error power that is
+not noise: nearly 1 for a large error and small near the noise floor. With a fixed gain noise would be learned, and good
+initial forces would get worse. A setback is a repeat that increased the error; the best forces are kept.
 
-At the ends of the record nothing is corrected. An inverse that cannot act before the first row would respond to an
-error there with an impulse; a handle that sticks would not move, and the impulse would grow with every repeat.
+Corrections are faded to zero at both ends of the record. An inverse that cannot act before the first row would respond
+to an error there with an impulse; a handle held by static friction would not move, and the impulse would grow with
+every repeat.
 """
 
 from collections.abc import Callable
@@ -20,21 +22,21 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_part import band_part
 
 Invert = Callable[[FloatArray], FloatArray]
-"""Linear inverse of the device: wanted accelerations (N, p) to forces (N, m), row by row."""
+"""Linear inverse of the device: from wanted motion (N, p) to forces (N, m), with N rows in time each."""
 
 SURE = 3.0
-"""Standard deviations above the noise floor from which a residual is more than noise."""
+"""A residual power this many standard deviations above the noise power is more than noise."""
 WORSE, DIVERGED = 1.1, 2.0
-"""Ratio of a residual to the best one: above the first, the next correction starts from the best forces again; above
-the second, the iteration counts as diverging."""
+"""Ratios of a residual to the smallest so far: above the first, the next correction starts from the best forces again;
+above the second, the iteration counts as diverging."""
 LOWEST_GAIN = 0.03
-"""Gains below it make no measurable change."""
+"""Gain below which the iteration ends, because a correction makes no measurable change."""
 EDGE_S = 0.03
-"""Time over which corrections are faded at either end of the record."""
+"""Time (s) over which corrections are faded at either end of the record."""
 
 
 class Verdict(Enum):
-    """Decision after each measurement: to continue, or the reason to stop. The value states it in words."""
+    """Decision after each measurement: to continue, or the reason to stop, with a text for the user as value."""
 
     CONTINUE = "play the forces and measure"
     AT_FLOOR = "what is left cannot be distinguished from the measured noise"
@@ -52,20 +54,21 @@ class Repetition:
     sample_rate_hz: float
     band_hz: tuple[float, float]
     first_gain: float = 1.0
-    """Gain of the first correction; below the `safe_beta` of `convergence`."""
+    """Upper bound beta_0 of the gain; to be chosen below the `safe_beta` of `convergence`."""
     noise_floor: float | None = None
     """Noise of one play, rms in the band, in the unit of `wanted`; None = estimated from the first two plays, which use
     the same forces."""
     cap: float | None = None
-    """Largest length of a force, N."""
+    """Largest magnitude of the force vector of a row, N; None = not limited."""
     slew: float | None = None
-    """Largest change of a force, N/s, by the corrections; the first forces are not limited by it."""
+    """Largest rate of change of the corrected force vector, N/s; None = not limited. The first forces are not checked
+    against it."""
     judged: tuple[int, int] | None = None
-    """First row and the one behind the last over which residuals are computed; None = all. Other rows are corrected
-    too, but no reasonable force is right where a handle sticks after the motion."""
+    """Rows [first, end) over which residuals are computed; None = all. Other rows are corrected too, but are not
+    judged: after the motion static friction may hold the handle, and no reasonable force moves it exactly."""
 
     def residual(self, missing: FloatArray) -> float:
-        """rms over the judged rows."""
+        """Root mean square of the error (N, p) over the judged rows and all channels, in the unit of `wanted`."""
         start, stop = self.judged or (0, len(missing))
         return rms(missing[start:stop])
 
@@ -80,13 +83,14 @@ class Repetition:
 
     @property
     def degrees_of_freedom(self) -> float:
-        """Degrees of freedom of the judged rows in the band."""
+        """Degrees of freedom of the judged rows in the band: 2 x bandwidth x duration x channels."""
         low, high = self.band_hz
         start, stop = self.judged or (0, len(self.wanted))
         return float(2 * (high - low) * (stop - start) * self.wanted.shape[1] / self.sample_rate_hz)
 
     def find_allowed_share(self, forces: FloatArray, correction: FloatArray) -> float:
-        """The largest share of a correction, up to 1, that cap and slew allow. Both (N, m)."""
+        """Largest factor on the correction, up to 1, with which forces plus correction obey cap and slew limit. Both
+        (N, m) in N."""
         share = 1.0 if self.cap is None else largest_share(forces, correction, self.cap)
         if self.slew is None:
             return share
@@ -106,21 +110,25 @@ class IterationState:
 
     repetition: Repetition
     forces: FloatArray
-    """(N, m): forces to play next; with a verdict other than CONTINUE the best ones."""
+    """(N, m): forces (N) to play next; the best forces once the verdict is not CONTINUE."""
     verdict: Verdict
     best: FloatArray
-    """(N, m)"""
+    """(N, m): forces (N) with the smallest residual so far."""
     best_residual: float
+    """Residual of the best forces, rms, in the unit of `wanted`; infinite before the first."""
     best_missing: FloatArray
-    """(N, p): residual after the best forces, noise included."""
+    """(N, p): error signal in the band after the best forces, noise included."""
     noise_floor: float | None
+    """As `Repetition.noise_floor`; None until it is known."""
     residuals: tuple[float, ...] = ()
     """Residual of each play, rms of wanted minus measured in the band, noise included. Two plays that are averaged
     count as one."""
     gains: tuple[float, ...] = ()
+    """Gain beta of each correction, before cap and slew limit."""
     fitted: tuple[float, ...] = ()
-    """Share of each correction that fitted under cap and slew limit; 1 = all."""
+    """Factor on each correction by which cap and slew limit reduced it; 1 = not reduced."""
     setbacks: int = 0
+    """Number of repeats with a larger residual than the one before."""
     first_measured: FloatArray | None = None
     """(N, p): measurement of the first play, until the second gives the noise."""
 
@@ -131,7 +139,7 @@ class IterationState:
 
     @property
     def remark(self) -> str:
-        """Effect of cap and slew limit in words, or empty."""
+        """Sentence on the corrections that cap and slew limit reduced; empty where they reduced none."""
         lowest = min(self.fitted, default=1.0)
         if lowest >= 1:
             return ""
@@ -142,8 +150,8 @@ class IterationState:
 
 
 def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationState:
-    """The state before the first play. first: (N, m), forces to begin with; None = the model's inverse of what is
-    wanted. Raises ValueError where the first forces are above the cap, or what is wanted has nothing in the band."""
+    """The state before the first play. first: (N, m), initial forces (N); None = the model's inverse of the wanted
+    motion. Raises ValueError where the first forces exceed the cap, or the wanted motion has no part in the band."""
     if repetition.level == 0:
         low, high = repetition.band_hz
         raise ValueError(
@@ -160,9 +168,9 @@ def begin(repetition: Repetition, first: FloatArray | None = None) -> IterationS
 
 
 def next_forces(state: IterationState, measured: FloatArray) -> IterationState:
-    """The state after a play: forces corrected by the measured error, and whether to go on. measured: (N, p), the
-    answer to `state.forces`. Raises ValueError on another shape, on values that are not finite, and where the verdict
-    was to stop."""
+    """The state after a play: the forces corrected by the measured error, and the verdict. measured: (N, p), the
+    response to `state.forces`. Raises ValueError for another shape, for values that are not finite, and where the
+    verdict was to stop. Without a known noise floor the same forces are due twice."""
     repetition = state.repetition
     if state.verdict is not Verdict.CONTINUE:
         raise ValueError(f"this iteration is over: {state.verdict.value}")
@@ -181,15 +189,15 @@ def next_forces(state: IterationState, measured: FloatArray) -> IterationState:
 
 
 def noise_of_repeats(measured: FloatArray, repetition: Repetition) -> float:
-    """Noise of a single play: rms in the band of the differences between plays of the same forces. measured: (plays, N,
-    p)."""
+    """Noise of a single play: rms in the band of the deviations from the mean of several plays of the same forces
+    (sample standard deviation). measured: (plays, N, p), at least two plays."""
     off = measured - measured.mean(axis=0)
     squares = sum(float(np.sum(repetition.part(each) ** 2)) for each in off)
     return float(np.sqrt(squares / ((len(measured) - 1) * measured[0].size)))
 
 
 def noise_of_rest(rest: FloatArray, repetition: Repetition) -> float:
-    """Rms in the band of a record (n, p) during which nothing was commanded."""
+    """Rms in the band of a record (n, p) during which no force was commanded; the mean is removed first."""
     return rms(repetition.part(rest - rest.mean(axis=0)))
 
 
@@ -199,6 +207,8 @@ def rms(samples: FloatArray) -> float:
 
 
 def _judge_measurement(state: IterationState, measured: FloatArray, floor: float, plays: int) -> IterationState:
+    """The state after a measurement with this noise floor of a single play, averaged over so many plays: a stop, or
+    corrected forces."""
     repetition = state.repetition
     missing = repetition.part(repetition.wanted - measured)
     residual, noise = repetition.residual(missing), floor / np.sqrt(plays)
@@ -210,7 +220,8 @@ def _judge_measurement(state: IterationState, measured: FloatArray, floor: float
         state = replace(state, best=state.forces, best_residual=residual, best_missing=missing)
     elif residual > WORSE * state.best_residual:
         base, left = state.best, state.best_missing
-    # Two measured powers are compared, each with its own random error.
+    # Residual and noise power are both measured, each with the relative variance 2 / (degrees of freedom); the ratio
+    # of both then has the relative standard deviation sqrt(4 / (degrees of freedom)).
     limit = noise * np.sqrt(1 + SURE * np.sqrt(4 / repetition.degrees_of_freedom))
     if residual <= limit:
         return _finish(state, Verdict.AT_FLOOR)
@@ -224,10 +235,13 @@ def _judge_measurement(state: IterationState, measured: FloatArray, floor: float
 
 
 def _finish(state: IterationState, verdict: Verdict) -> IterationState:
+    """The final state, with the best forces."""
     return replace(state, forces=state.best, verdict=verdict)
 
 
 def _correct_forces(state: IterationState, base: FloatArray, left: FloatArray, gain: float) -> IterationState:
+    """The state with the forces `base` (N, m) corrected for the error `left` (N, p); final where cap or slew limit
+    leave nearly nothing of the correction."""
     repetition = state.repetition
     correction = gain * fade_ends(repetition.invert(left), repetition.sample_rate_hz)
     fitted = repetition.find_allowed_share(base, correction)
@@ -237,19 +251,19 @@ def _correct_forces(state: IterationState, base: FloatArray, left: FloatArray, g
 
 
 def fade_ends(rows: FloatArray, sample_rate_hz: float) -> FloatArray:
-    """Fade rows (N, m) to zero at the first and the last row."""
+    """Rows (N, m) faded to zero at the first and the last row by a raised-cosine ramp of `EDGE_S` seconds."""
     until_end = np.minimum(np.arange(len(rows)), np.arange(len(rows))[::-1])
     inside = np.clip(until_end / (EDGE_S * sample_rate_hz), 0.0, 1.0)
     return np.asarray(rows * (0.5 - 0.5 * np.cos(np.pi * inside))[:, np.newaxis])
 
 
 def largest_share(forces: FloatArray, correction: FloatArray, cap: float) -> float:
-    """The largest share of `correction` (N, m), up to 1, with which no force is longer than `cap`."""
+    """Largest factor s, up to 1, with which no row of forces + s correction is longer than `cap`. Both (N, m)."""
     a = np.sum(correction**2, axis=1)
     b = np.sum(forces * correction, axis=1)
     room = np.maximum(cap**2 - np.sum(forces**2, axis=1), 0.0)
     moving = a > 0
-    # The positive root of a s² + 2 b s = room.
+    # The positive root s of |forces + s correction|² = cap², that is, of a s² + 2 b s = room.
     roots = (np.sqrt(b[moving] ** 2 + a[moving] * room[moving]) - b[moving]) / a[moving]
     # Slightly less than the exact share, so that rounding does not put the longest force above the cap.
     return float(min(1.0, (1 - 1e-9) * roots.min(initial=2.0)))

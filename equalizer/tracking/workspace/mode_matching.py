@@ -1,4 +1,9 @@
-"""Matching of resonances between models, by frequency and the modal assurance criterion of their residues."""
+"""Matching of resonances between models that were identified at different places of the workspace.
+
+A pair of modes costs |ln(f1 / f2)| / FREQUENCY_SCALE + 1 - MAC, with the natural frequencies f and the modal assurance
+criterion of their residue matrices (MAC; Allemang and Brown, IMAC 1982). The pairs with the least total cost are found
+as a linear assignment problem, in which a mode may also stay without a partner at a fixed cost.
+"""
 
 from collections.abc import Sequence
 
@@ -9,23 +14,24 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.workspace.band_modes import BandMode
 
 FREQUENCY_SCALE = 0.3
-"""Change of log frequency that costs as much as orthogonal shapes."""
+"""Change of the natural logarithm of the frequency that costs as much as orthogonal shapes (MAC = 0)."""
 ALONE = 0.6
-"""Cost of a mode without a partner; a pair may cost twice as much at most."""
+"""Cost of a mode without a partner; a pair is therefore matched only where it costs at most twice as much."""
 LEAST_LIKENESS = 0.5
-"""Least likeness (MAC, 0 to 1) of the shapes of two modes that are matched."""
+"""Least MAC (0 to 1) of two modes that are matched."""
 LEAST_MARGIN = 0.1
-"""Smallest difference in cost to the best matching without one of the pairs."""
+"""Least additional cost of the best matching without a pair; below it, the pair is ambiguous."""
 WEAK = 0.1
-"""Share of the response below which a mode without a partner is left to the smooth remainder."""
+"""Share of the response (`BandMode.share`) below which a mode may stay without a partner."""
 
 
 class ModesDoNotMatchError(ValueError):
-    """The resonances of two models cannot be matched with confidence; the text says why."""
+    """The resonances of two models cannot be matched unambiguously; the message says why."""
 
 
 def mode_likeness(first: ComplexArray, second: ComplexArray) -> float:
-    """Modal assurance criterion of residue matrices (p, m): 1 = equal but for a complex factor, 0 = orthogonal."""
+    """Modal assurance criterion |<a, b>|^2 / (<a, a> <b, b>) of residue matrices (p, m): 1 = proportional with a
+    complex factor, 0 = orthogonal, or one of them zero."""
     sizes = float(np.vdot(first, first).real * np.vdot(second, second).real)
     return float(abs(np.vdot(first, second)) ** 2 / sizes) if sizes else 0.0
 
@@ -33,10 +39,11 @@ def mode_likeness(first: ComplexArray, second: ComplexArray) -> float:
 def match_modes(
     firsts: Sequence[BandMode], seconds: Sequence[BandMode], band_hz: tuple[float, float]
 ) -> tuple[tuple[int, int], ...]:
-    """Pairs of indices, in the order of the first model's modes. A weak mode, or one outside the band, may stay alone.
+    """Pairs of indices (first model, second model), in the order of the first model's modes. A weak mode, or one
+    outside the band, may stay without a partner.
 
-    Raises ModesDoNotMatchError where a strong mode of the band finds no partner, a pair is unlike, or another matching
-    is nearly as good.
+    Raises ModesDoNotMatchError where a strong mode in the band has no partner, the MAC of a pair is too small, or
+    another matching costs nearly as little.
     """
     costs = _assignment_costs(firsts, seconds)
     pairs, total = _assign_modes(costs, len(firsts), len(seconds))
@@ -57,6 +64,7 @@ def match_modes(
                 "identify places nearer to each other"
             )
         forbidden = costs.copy()
+        # Far more than leaving both modes without a partner: the assignment avoids this pair.
         forbidden[i, j] = 10.0
         if _assign_modes(forbidden, len(firsts), len(seconds))[1] - total < LEAST_MARGIN:
             raise ModesDoNotMatchError(
@@ -66,7 +74,8 @@ def match_modes(
 
 
 def _assignment_costs(firsts: Sequence[BandMode], seconds: Sequence[BandMode]) -> FloatArray:
-    """Square cost matrix; further rows and columns mean having no partner."""
+    """(rows + columns, rows + columns): cost of each pair; the rows and columns after the modes of the two models stand
+    for the absence of a partner."""
     rows, columns = len(firsts), len(seconds)
     costs = np.full((rows + columns, rows + columns), ALONE)
     costs[rows:, columns:] = 0.0
@@ -78,6 +87,7 @@ def _assignment_costs(firsts: Sequence[BandMode], seconds: Sequence[BandMode]) -
 
 
 def _assign_modes(costs: FloatArray, rows: int, columns: int) -> tuple[tuple[tuple[int, int], ...], float]:
+    """Pairs of modes with the least total cost, and that cost. rows, columns: number of modes of the two models."""
     i, j = linear_sum_assignment(costs)
     pairs = tuple((int(a), int(b)) for a, b in zip(i, j, strict=True) if a < rows and b < columns)
     return pairs, float(costs[i, j].sum())

@@ -1,4 +1,9 @@
-"""Interpolation weights of scattered points at a place between them."""
+"""Interpolation weights of scattered points at a place between them: for models identified at points of the workspace.
+
+Two sets of weights are computed: barycentric coordinates on the Delaunay triangulation (piecewise linear, never
+negative), and cardinal functions of multiquadric radial basis functions (smooth). A place outside the convex hull of
+the points is replaced by the nearest place inside.
+"""
 
 from dataclasses import dataclass
 
@@ -11,18 +16,20 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.workspace.workspace_models import Place
 
 FLAT = 0.05
-"""Relative spread below which points are taken as flat in a direction: else the triangulation of hand-placed points
+"""Spread of the points in a principal direction, relative to the largest (ratio of singular values), below which that
+direction is ignored: otherwise the triangulation of hand-placed points, which lie on a line or surface only nearly,
 would have slivers that join distant points."""
 OUTSIDE_M = 1e-3
-"""Distance to the points' hull up to which a place counts as inside."""
+"""Distance to the points' convex hull, in m, up to which a place counts as inside."""
 SUM_TO_ONE = 1e6
-"""Weight of the condition that weights sum to 1, against distances of order 1, in the search for the nearest point of
-the hull."""
+"""Factor of the equation sum(w) = 1 in the least-squares search for the nearest point of the hull; the other equations
+are distances of order 1."""
 
 BEND = 0.35
-"""Shape parameter of the radial functions times the distance between neighbours: smaller is closer to a parabola."""
+"""Shape parameter epsilon of the multiquadrics sqrt(1 + (epsilon r)^2), times the distance r between neighbours: the
+smaller, the closer they are to parabolas."""
 ROUNDING = 1e-6
-"""Weights below this are set to zero, because each point costs a computation of its forces."""
+"""Linear weights below this are set to zero, because forces are computed for each point with a weight."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,14 +39,14 @@ class PlaceWeights:
     linear: FloatArray
     """(points,): none negative, sum 1; linear between neighbours, continuous, exact at the points."""
     smooth: FloatArray
-    """(points,): sum 1, exact at the points, and their slope is continuous; some may be negative. For quantities that
-    vary smoothly with the place, such as a frequency: of second order where `linear` is of first."""
+    """(points,): sum 1, exact at the points, with a continuous slope; some may be negative. For quantities that vary
+    smoothly with the place, such as a frequency."""
     outside_m: float
-    """How far the place lies outside the points' hull; the weights are those of the nearest place inside."""
+    """Distance of the place from the points' convex hull in m; the weights are those of the nearest place inside."""
 
     @property
     def remark(self) -> str | None:
-        """Sentence for the user on a place more than `OUTSIDE_M` outside the hull; else None."""
+        """Sentence for the user about a place more than `OUTSIDE_M` outside the hull; else None."""
         if self.outside_m <= OUTSIDE_M:
             return None
         return (
@@ -49,8 +56,9 @@ class PlaceWeights:
 
 
 def place_weights(points_m: FloatArray, place_m: Place | FloatArray) -> PlaceWeights:
-    """Weights of points_m (points, 3), all different, at a place, on their Delaunay triangulation: along a line, over a
-    surface or in a volume, as the points lie. Inverse distance would have zero slope at every point."""
+    """Weights of points_m (points, 3), all different, at place_m (3,), both in m. Points nearly on a line or in a plane
+    are interpolated in that line or plane. Inverse-distance weights are not used, because interpolation with them has
+    zero slope at every point."""
     points = np.asarray(points_m, dtype=np.float64)
     place = np.asarray(place_m, dtype=np.float64)
     if len(points) == 1:
@@ -67,7 +75,8 @@ def place_weights(points_m: FloatArray, place_m: Place | FloatArray) -> PlaceWei
 
 
 def _spread_directions(offsets: FloatArray) -> FloatArray:
-    """(dimensions, 3): principal directions in which the points spread, as many as keep them distinct."""
+    """(dimensions, 3): principal directions of the offsets (points, 3), by singular value decomposition. Directions
+    with little spread (`FLAT`) are left out, unless two points would coincide, or nearly, without them."""
     _, spreads, directions = np.linalg.svd(offsets, full_matrices=False)
     rank = int((spreads > FLAT * spreads[0]).sum())
     full = int((spreads > 1e-9 * spreads[0]).sum())
@@ -78,17 +87,22 @@ def _spread_directions(offsets: FloatArray) -> FloatArray:
 
 
 def _smallest_distance(points: FloatArray) -> float:
+    """Smallest distance between two of the points (points, dimensions)."""
     apart = np.linalg.norm(points[:, None] - points[None], axis=2)
     return float(apart[np.triu_indices(len(points), 1)].min())
 
 
 def _nearest_in_hull(points: FloatArray, place: FloatArray) -> FloatArray:
+    """(dimensions,): the place itself, or the nearest point of the convex hull: the least |sum w_i p_i - place| with
+    w_i >= 0 and sum w_i = 1, by non-negative least squares."""
     system = np.vstack([points.T, np.full(len(points), SUM_TO_ONE)])
     weights, _ = nnls(system, np.append(place, SUM_TO_ONE))
     return np.asarray(weights @ points / weights.sum())
 
 
 def _linear_weights(points: FloatArray, place: FloatArray) -> FloatArray:
+    """(points,): barycentric coordinates of the place in its simplex of the Delaunay triangulation; between the two
+    neighbours in one dimension."""
     count, dimensions = points.shape
     if dimensions == 1:
         order = np.argsort(points[:, 0])
@@ -99,7 +113,7 @@ def _linear_weights(points: FloatArray, place: FloatArray) -> FloatArray:
     mesh = Delaunay(points)
     simplex = int(mesh.find_simplex(place, tol=1e-9))
     if simplex < 0:
-        # On the hull to rounding: a step of a millionth towards the middle is inside.
+        # The place is outside the hull by rounding: a step of a millionth towards the centre is inside.
         place = place + 1e-6 * (points.mean(axis=0) - place)
         simplex = int(mesh.find_simplex(place, tol=1e-6))
     transform = mesh.transform[simplex]
@@ -112,8 +126,9 @@ def _linear_weights(points: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _smooth_weights(points: FloatArray, place: FloatArray) -> FloatArray:
-    """Multiquadric radial basis functions with a linear part, so wide that they are nearly parabolas between three
-    points: a cubic spline's curvature vanishes at the outer ones, where a device's need not."""
+    """(points,): cardinal functions of multiquadric radial basis functions with a linear part, so wide that they are
+    nearly parabolas through three points. A natural cubic spline is not used: its curvature vanishes at the outer
+    points, where that of a device's parameters need not."""
     apart = np.linalg.norm(points[:, None] - points[None], axis=2)
     nearest = np.median(np.partition(apart, 1, axis=1)[:, 1])
     cardinal = RBFInterpolator(points, np.eye(len(points)), kernel="multiquadric", epsilon=BEND / nearest, degree=1)

@@ -1,7 +1,7 @@
-"""Six positions under gravity: bias, sensitivity with cross-axis, and noise of the accelerometer.
+"""Six-position calibration of an accelerometer under gravity: bias, sensitivity with cross-axis terms, and noise.
 
-raw = sensitivity a + bias is solved by least squares for six known directions of gravity. At rest the sensor reads
-what holds it up: +g along the axis that points up.
+raw = sensitivity a + bias is solved by least squares for six known directions of gravity. An accelerometer measures
+specific force: at rest it reads +g along the axis that points up.
 """
 
 from dataclasses import dataclass
@@ -14,17 +14,18 @@ GRAVITY_MPS2 = 9.80665
 """Standard gravity (m/s^2)."""
 
 POSITIONS = ("+x up", "-x up", "+y up", "-y up", "+z up", "-z up")
-"""How the sensor is laid down, in the order of the rows of `UP`."""
+"""Names of the positions, by the axis that points up, in the order of the rows of `UP`."""
 UP = np.kron(np.eye(3), np.array([[1.0], [-1.0]]))
-"""(6, 3): the axis that points up in each position."""
+"""(6, 3): unit vector along the axis that points up, in each position."""
 
 WORST_RESIDUAL = 0.05
-"""Largest residual, in g. Six readings and twelve unknowns leave six residuals; tilts of 1 to 2 degrees in laying the
-sensor down give 0.02 to 0.04 g, a mistaken position more than 0.5."""
+"""Largest accepted residual, in g. Six readings of three channels and twelve unknowns leave six degrees of freedom.
+Tilts of the sensor by 1 to 2 degrees give residuals of 0.02 to 0.04 g, a mistaken position more than 0.5 g."""
 
 
 WORST_CONDITION = 10.0
-"""Largest condition number of the sensitivity: the ADXL335's channels differ by 10 %, a dead channel by any factor."""
+"""Largest accepted condition number of the sensitivity matrix. The channels of an ADXL335 differ by 10 %; a dead
+channel makes the number arbitrarily large."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,22 +33,22 @@ class Calibration:
     """Calibration of an accelerometer with three channels: converts raw values to acceleration."""
 
     bias: FloatArray
-    """(3,), raw at no acceleration."""
+    """(3,), raw value at zero acceleration."""
     sensitivity: FloatArray
-    """(3, 3), raw per m/s²: row = channel, column = axis."""
+    """(3, 3), raw value per m/s²: row = channel, column = axis."""
     noise_mps2: FloatArray
-    """(3,), standard deviation at rest."""
+    """(3,), standard deviation at rest, m/s²."""
     residual_g: float
-    """Largest misfit of a position, of g."""
+    """Largest residual of a position (norm over the channels), in g."""
 
     def acceleration(self, raw: FloatArray) -> FloatArray:
-        """(n, 3) or (3,), m/s², gravity included."""
+        """Acceleration (n, 3) or (3,) in m/s², gravity included, of raw values of the same shape."""
         turned = np.linalg.solve(self.sensitivity, (np.asarray(raw, dtype=np.float64) - self.bias).T)
         return np.asarray(turned.T, dtype=np.float64)
 
     @property
     def cross_axis(self) -> float:
-        """Largest share of one axis in another channel."""
+        """Largest cross-axis sensitivity of a channel, relative to its sensitivity to its own axis."""
         of_own = np.abs(np.diag(self.sensitivity))
         others = np.abs(self.sensitivity - np.diag(np.diag(self.sensitivity)))
         return float((others / of_own[:, None]).max())
@@ -57,7 +58,8 @@ def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
     """Bias, sensitivity matrix and noise by least squares from six positions under gravity. positions: raw samples (n,
     3) at rest in each of `POSITIONS`.
 
-    Raises ValueError that says which position does not fit, or that a channel hardly answers.
+    Raises ValueError for missing positions, for a position whose residual is too large (the message names it), and for
+    a channel that hardly responds to gravity.
     """
     if len(positions) != len(POSITIONS) or any(len(samples) < 2 for samples in positions):
         raise ValueError(f"{len(POSITIONS)} positions are needed, each with two samples or more")

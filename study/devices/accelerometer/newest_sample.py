@@ -1,7 +1,9 @@
-"""Newest sample of a sensor, handed without locks from the thread that reads it to a loop that must not wait.
+"""Newest sample of a sensor: passed from the thread that reads the sensor to a control loop that must not wait.
 
-One writer, any number of readers, compiled ones too. A reader sees a whole sample, unless the writer laps it within a
-reading: then it reads once more. The lock is a barrier: its release makes a row visible before the count that names it.
+A ring buffer with a sequence counter, for one writer and any number of readers, compiled code included. Readers take no
+lock. A reader copies the newest row, then checks by the counter that the writer cannot have overwritten that row
+meanwhile; otherwise it copies again. The writer's lock serves as a memory barrier: its release makes a row visible
+before the counter that refers to it.
 """
 
 import threading
@@ -11,45 +13,49 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 FRESH_S = 0.05
-"""A sample that is older is none: fifty ticks, and longer than a busy computer leaves a thread waiting."""
+"""Age in s above which a sample no longer counts: fifty ticks of the control loop, and longer than a thread waits for
+its turn on a busy computer."""
 
 COUNT, REST, ROWS = 0, 1, 16
-"""Columns of the first row: number of samples so far, acceleration that counts as zero (3). The other rows are
-samples."""
+"""Columns of the first row: number of samples so far, first of three for the acceleration at rest. ROWS: number of
+further rows, the ring of samples."""
 TAKEN_S, SENSED, CLIPPED, WIDTH = 0, 1, 4, 5
-"""Columns of a sample: time of arrival by the monotonic clock, acceleration (3), m/s², whether a channel was at its
-limit."""
+"""Columns of a sample: time of arrival by the monotonic clock (s), first of three for the acceleration (m/s²), 1 where
+a channel was at its limit. WIDTH: number of columns."""
 
 
 class NewestSample:
-    """Written by one thread."""
+    """Ring buffer of samples. Only one thread may call `put`; any thread may read."""
 
     def __init__(self) -> None:
         self.rows: FloatArray = np.zeros((1 + ROWS, WIDTH))
+        """(1 + ROWS, WIDTH): counter and rest acceleration, then the ring."""
         self._barrier = threading.Lock()
 
     def put(self, taken_s: float, acceleration: FloatArray, clipped: bool) -> None:
-        """taken_s: time of arrival by `time.monotonic`; acceleration: (3,), m/s², as sensed; clipped: whether a channel
-        is at its limit."""
+        """Add a sample. taken_s: time of arrival by `time.monotonic`; acceleration: (3,), m/s², as sensed;
+        clipped: whether a channel is at its limit."""
         count = self.rows[0, COUNT]
         with self._barrier:
             self.rows[1 + int(count) % ROWS] = taken_s, *acceleration, clipped
         self.rows[0, COUNT] = count + 1.0
 
     def latest(self) -> FloatArray | None:
-        """A row, as it was sensed, however old. None before the first."""
+        """(WIDTH,): copy of the newest row, as sensed, of any age. None before the first sample."""
         while count := int(self.rows[0, COUNT]):
             row: FloatArray = self.rows[1 + (count - 1) % ROWS].copy()
+            # The writer may be filling the next row: this row is intact while fewer than ROWS - 1 more were written.
             if self.rows[0, COUNT] - count < ROWS - 1:
                 return row
         return None
 
     def count_as_none(self, acceleration: FloatArray) -> None:
-        """(3,): read so, it is at rest."""
+        """Set the reading at rest (3,), m/s², which `fresh` subtracts (such as gravity and offset)."""
         self.rows[0, REST : REST + 3] = acceleration
 
     def fresh(self, now_s: float) -> tuple[FloatArray, bool]:
-        """Acceleration (3,), m/s², NaN where there is none of now; whether a channel is at its limit."""
+        """Acceleration less the reading at rest, (3,), m/s², NaN without a sample younger than `FRESH_S`; and whether a
+        channel is at its limit. now_s: by `time.monotonic`."""
         row = self.latest()
         if row is None or now_s - row[TAKEN_S] > FRESH_S:
             return np.full(3, np.nan), False

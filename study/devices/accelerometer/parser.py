@@ -1,11 +1,12 @@
-"""Parses a byte stream, which may be torn, incomplete or garbled, to samples: every packet whose checksum is right, in
-order.
+"""Parser of the accelerometer's byte stream, which may be interrupted, incomplete or garbled: gives the samples of all
+packets with a correct checksum, in order.
 
-A packet is looked for at every byte, so a garbled one hides none of its neighbours. A check sum is right by chance once
-in 65 536 times; so a packet counts at once where number and time are those that come next at the board's rate, and
-otherwise, as after a stall or where the microcontroller began anew, when the next two packets follow it.
+A packet is searched at every byte, so that a garbled packet hides none of its neighbours. A wrong packet has a correct
+checksum once in 2^16 = 65 536 times. Therefore a packet counts at once only where its sequence number and time stamp
+are the expected ones at the board's sample rate; otherwise, as after a stall or a restart of the microcontroller, it
+counts when two further packets follow it.
 
-A packet is 16 bytes, the low byte first (`docs/firmware/packet.h` makes the same): offset and length of
+A packet has 16 bytes, least significant byte first (`docs/firmware/packet.h` is the sender). Offset and length of:
 
  0  2  sync, A5 5A
  2  2  sequence number, modulo 2^16
@@ -41,7 +42,7 @@ LAYOUT = np.dtype(
 
 
 def crc_of(rows: Bytes) -> npt.NDArray[np.uint16]:
-    """Checksum of each row of bytes, shape (n, k): shape (n,)."""
+    """(n,): CRC-16/CCITT-FALSE of each row of bytes (n, k), byte by byte with a table."""
     crc = np.full(len(rows), START, dtype=np.uint16)
     for column in rows.T:
         crc = (crc << 8) ^ _TABLE[(crc >> 8) ^ column]
@@ -49,6 +50,7 @@ def crc_of(rows: Bytes) -> npt.NDArray[np.uint16]:
 
 
 def _table() -> npt.NDArray[np.uint16]:
+    """The table `_TABLE`: eight steps of the shift register for each value of a byte, most significant bit first."""
     table = np.arange(256, dtype=np.uint32) << 8
     for _ in range(8):
         table = np.where(table & 0x8000, (table << 1) ^ POLYNOMIAL, table << 1) & 0xFFFF
@@ -56,28 +58,30 @@ def _table() -> npt.NDArray[np.uint16]:
 
 
 _TABLE = _table()
-"""(256,): CRC of each value of a byte, for a step of eight bits."""
+"""(256,): change of the CRC register by each value of a byte."""
 
 
 LONGEST_SILENCE_US = 10_000_000
-"""Between two packets of one clock. After a longer silence the host's clock is fitted anew, as after a restart."""
+"""Longest time (µs) between two packets of one clock. After a longer silence the relation to the host's clock is
+estimated anew, as after a restart."""
 
 SHORTEST_PERIOD_US = 50
-"""No board sends more often: what looks like many lost packets in too short a time is another clock."""
+"""Shortest sample period (µs) of any board: a gap in the numbers that is too large for the time passed shows another
+clock, that is, a restart."""
 
 NEXT_US, JITTER_SHARE, PERIOD_SHARE = 1_000_000, 0.25, 0.01
-"""A packet counts at once that comes within this time of the last, by the board's clock, at the time that its number
-tells: within a share of a period, and of all the time since the last."""
+"""A packet counts at once if its time stamp is less than the first (µs) after the last packet, and agrees with its
+number at the mean period, within the second as a share of a period plus the third as a share of the time passed."""
 
 PERIOD_GAIN = 0.1
-"""Weight of a new period in the mean of the periods."""
+"""Weight of a new period in the exponential mean of the periods."""
 
 CONFIRMED_BY = 2
-"""Packets that must follow one another to the next before a packet counts that did not come next: two false ones in a
-row may, three never do."""
+"""Number of earlier doubtful packets that a packet with an unexpected number or time must follow to count (1
+for the first packets of a stream). Two false packets may follow each other by chance, three in practice do not."""
 
 MOST_DOUBTFUL = 8
-"""Packets in a row that neither come next nor follow each other: more than chance ever makes."""
+"""Largest number of doubtful packets that are kept, the newest: more than occur by chance."""
 
 Indices = npt.NDArray[np.intp]
 Packets = npt.NDArray[np.void]
@@ -85,34 +89,34 @@ Packets = npt.NDArray[np.void]
 
 
 class _Found(NamedTuple):
-    """A packet whose checksum is right."""
+    """A packet with a correct checksum."""
 
     packet: Packets
-    """(1,)."""
+    """The packet, shape (1,)."""
     at: int
-    """Its first byte, of all that were received."""
+    """Index of its first byte in all bytes received."""
 
 
 class PacketParser:
-    """Parser of a board's byte stream: `feed` takes the bytes as they come, and returns the samples of whole packets.
-    Packets with a wrong checksum are skipped and counted."""
+    """Parser of a board's byte stream: `feed` takes the bytes as they arrive, and returns the samples of complete
+    packets. Bytes of packets with a wrong checksum are skipped and counted."""
 
     def __init__(self) -> None:
         self._rest: Bytes = np.zeros(0, dtype=np.uint8)
         self._last: Packets | None = None
         """The newest packet that counts, shape (1,)."""
         self._doubtful: list[_Found] = []
-        """Those after it that do not come next: the next ones must confirm them."""
+        """Packets after it with an unexpected number or time, which later packets must confirm."""
         self._period_us = math.nan
-        """Mean time from number to number, by the board's clock."""
+        """Mean sample period (µs) by the board's clock; NaN before the first is known."""
         self._sequence, self._time_us = 0, 0
-        """Number and time of the newest packet, unwrapped."""
+        """Number and time (µs) of the newest packet that counts, without the wrap-around of the counters."""
         self._received = self._used = self._shared = 0
-        """Bytes so far; those up to the end of the newest packet that counts; those that belong to two of them."""
+        """Bytes received; bytes up to the end of the newest packet that counts; bytes shared by two such packets."""
         self.counts = Counts()
 
     def feed(self, data: bytes) -> Samples:
-        """The samples that became whole with these bytes."""
+        """The samples of the packets that these bytes complete."""
         stream = np.concatenate((self._rest, np.frombuffer(data, dtype=np.uint8)))
         self._received += len(data)
         starts, last = _whole_packets(stream), self._last
@@ -122,12 +126,13 @@ class PacketParser:
         else:
             packets, anew = self._choose(starts, packets)
         self._last = packets[-1:].copy() if len(packets) else last
-        # What may still be the beginning of a packet waits for its end.
+        # Up to 15 bytes at the end may be the beginning of a packet: they are kept for the next call.
         self._rest = stream[max(0, len(stream) - (SIZE - 1)) :].copy()
         return self._count_on(last, packets, anew)
 
     def _in_order(self, last: Packets, starts: Indices, packets: Packets) -> bool:
-        """Whether there is nothing to choose."""
+        """Whether all packets are the expected ones without overlap, so that all count (the usual, fast case). Then
+        also updates the mean period and the end of the bytes used."""
         follows_bytes = np.diff(starts, prepend=self._used - SIZE) >= SIZE
         if self._doubtful or not (follows_bytes & _comes_next(last, packets, self._period_us)).all():
             return False
@@ -138,9 +143,9 @@ class PacketParser:
         return True
 
     def _choose(self, starts: Indices, packets: Packets) -> tuple[Packets, npt.NDArray[np.int64]]:
-        """Choose the packets that count. Returns them, (n,), and (n,), 1 where the firmware began anew with the packet,
-        else 0. One that comes next may share bytes with the one before: that may have lost its last ones, and the
-        first of the next were the same."""
+        """Choose the packets that count. Returns them, (n,), and (n,): 1 where the firmware restarted before the
+        packet, else 0. An expected packet may share bytes with its predecessor: if the last bytes of the predecessor
+        were lost and the next packet begins with the same values, its checksum is still correct."""
         chosen, anew, last = [packets[:0]], [0] * 0, self._last
         for k, at in enumerate(starts.tolist()):
             found = _Found(packets[k : k + 1].copy(), at)
@@ -164,8 +169,8 @@ class PacketParser:
         return np.concatenate(chosen), np.array(anew, dtype=np.int64)
 
     def _between(self, last: Packets | None, found: _Found) -> list[_Found]:
-        """The doubtful packets whose bytes, numbers and times lie between the last one that counts and this one: the
-        board stamped or sent them late."""
+        """The doubtful packets whose bytes, numbers and times lie between the last packet that counts and `found`: the
+        board stamped or sent them late, so they count too."""
         between, used = [found][:0], self._used
         for doubtful in self._doubtful:
             inside = doubtful.at >= used and doubtful.at + SIZE <= found.at
@@ -177,7 +182,8 @@ class PacketParser:
         return between
 
     def _chain_to(self, found: _Found, before: int) -> list[_Found]:
-        """So many doubtful packets, each followed by the next and the last by this one, and itself; or none."""
+        """A chain of `before` doubtful packets and `found`, in which each packet follows its predecessor; empty if
+        there is none. Sets the mean period from its last two packets."""
         for before_it in combinations(self._doubtful[::-1], before):
             chain = [*before_it[::-1], found]
             if all(_follows(this.packet, other.packet).all() for this, other in pairwise(chain)):
@@ -187,8 +193,9 @@ class PacketParser:
         return []
 
     def _count_on(self, last: Packets | None, packets: Packets, anew: npt.NDArray[np.int64]) -> Samples:
-        """last: the packet before these, (1,). Where the firmware began anew number and time go on by a step: what
-        was lost meanwhile is not known."""
+        """Samples of these packets, with number and time counted on without wrap-around; updates `counts`. last: the
+        packet before these, (1,). At a restart of the firmware number and time increase by 1, because the number of
+        packets lost meanwhile is not known."""
         was = self.counts
         if last is None and len(packets):
             last = packets[:1]
@@ -210,31 +217,34 @@ class PacketParser:
         return Samples(sequence, time_us, packets["raw"], was.restarts + np.cumsum(anew))
 
     def _count_judged_bytes(self) -> int:
-        """Bytes that no later ones can make part of a packet."""
+        """Number of bytes whose use is decided: no later byte can make them part of a further packet. Bytes of two
+        overlapping packets count twice; bytes of doubtful packets do not count yet."""
         judged = max(self._used, self._received - len(self._rest))
         return judged + self._shared - sum(min(SIZE, max(0, judged - doubtful.at)) for doubtful in self._doubtful)
 
 
 def _steps(last: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """(n,) each: how far number and time of each packet, µs, are beyond those of the one before."""
+    """(n,) each: increase of the number and of the time (µs) from each packet's predecessor, modulo the counters."""
     both = np.concatenate((last, packets))
     numbers, times = both["sequence"].astype(np.int64), both["time_us"].astype(np.int64)
     return np.diff(numbers) % 2**16, np.diff(times) % 2**32
 
 
 def _follows(last: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
-    """(n,): whether each packet may be of the same clock as the one before and later. The one before may have been
-    stamped late, by less than a period: of two in a row nothing but the order of their times is known."""
+    """(n,): whether each packet may come from the same clock as its predecessor, and later. A time stamp may be late by
+    less than a period, so that for consecutive numbers only the order of the times is tested."""
     steps, times = _steps(last, packets)
     return (steps > 0) & (steps < 2**15) & (times > SHORTEST_PERIOD_US * (steps - 1)) & (times < LONGEST_SILENCE_US)
 
 
 def _is_repeat(last: Packets | None, packet: Packets) -> bool:
+    """Whether the packet equals the last byte by byte."""
     return last is not None and packet.tobytes() == last.tobytes()
 
 
 def _comes_next(last: Packets, packets: Packets, period_us: float) -> npt.NDArray[np.bool_]:
-    """(n,): whether each packet comes soon after the one before, at the board's rate. False for a period of NaN."""
+    """(n,): whether number and time of each packet are expected after its predecessor, at the mean period (see
+    `NEXT_US`). False for a period of NaN."""
     steps, times = _steps(last, packets)
     at_rate = np.abs(times - period_us * steps) <= period_us * (JITTER_SHARE + PERIOD_SHARE * steps)
     return at_rate & (times < NEXT_US) & _follows(last, packets)
@@ -253,5 +263,6 @@ def _whole_packets(stream: Bytes) -> Indices:
 
 
 def _packets_at(stream: Bytes, starts: Indices) -> Packets:
+    """(n,): packets of `SIZE` bytes from these positions of the stream."""
     packets: Packets = stream[starts[:, None] + np.arange(SIZE)].reshape(-1).view(LAYOUT)
     return packets

@@ -1,4 +1,8 @@
-"""A board on a serial line as a source of samples."""
+"""Accelerometer board on a serial line as a source of samples.
+
+Reads bytes with pyserial and parses packets with `parser`. Used by a thread of its own, so that a silent line cannot
+block the force loop.
+"""
 
 import time
 from typing import Any, Protocol
@@ -8,35 +12,37 @@ from study.devices.accelerometer.samples import Counts, Samples
 from study.errors import DeviceError
 
 AT_ONCE = 4096
-"""Bytes: 0.1 s at 2 kHz."""
+"""Maximum number of bytes per read: 256 packets of 16 bytes, 0.13 s at 2 kHz."""
 
 WAIT_S = 0.01
-"""Timeout for a byte on a silent line, and so the longest time until the thread notices `close`."""
+"""Timeout (s) of a read on a silent line; the reading thread notices `close` no later than this."""
 
 
 class Port(Protocol):
     """An open serial line."""
 
     def read(self, size: int) -> bytes:
-        """Read at most `size` bytes, with a short timeout: fewer or none if no more came."""
+        """Read at most `size` bytes: fewer if fewer have arrived, none after a short timeout."""
         ...
 
     def close(self) -> None:
-        """May raise; called once."""
+        """Close the line; may raise. Called once."""
         ...
 
 
 class SerialSource:
-    """A `Source` that parses the bytes of an open serial line. Closing it closes the line."""
+    """A `Source` that reads packets from an open serial line. Closing the source closes the line."""
 
     def __init__(self, port: Port) -> None:
         self._port, self._parser = port, PacketParser()
 
     @property
     def counts(self) -> Counts:
+        """Packets received and lost since the line was opened."""
         return self._parser.counts
 
     def read(self) -> tuple[Samples, float]:
+        """New samples, and their time of arrival by `time.monotonic` (s)."""
         data = self._port.read(AT_ONCE)
         arrived_s = time.monotonic()
         return self._parser.feed(data), arrived_s
@@ -46,7 +52,8 @@ class SerialSource:
 
 
 def open_serial(path: str, baud: int) -> SerialSource:
-    """Open a board on a serial line. Raises `DeviceError`."""
+    """Open a board on a serial line. path: the port, such as /dev/ttyACM0; baud: bits per second. Raises `DeviceError`
+    without pyserial, or where the port cannot be opened."""
     try:
         import serial
     except ImportError as error:
@@ -66,7 +73,8 @@ def open_serial(path: str, baud: int) -> SerialSource:
 
 
 class _SerialPort:
-    """What is there is read at once; where nothing is, a byte is waited for. pyserial would wait for all of them."""
+    """`Port` by pyserial, whose own `read(size)` would wait until all `size` bytes have arrived: this class waits for
+    the first byte only, then reads the bytes that are already in the buffer."""
 
     def __init__(self, line: Any) -> None:
         self._line = line

@@ -1,8 +1,9 @@
-"""Runs ticks: sense, govern, write. Compiled rigs get their forces here, others in `stepped_runner`.
+"""The runner of a device's control ticks: its interface, and its implementation for simulated (compiled) devices.
 
-A simulated device runs whole blocks of ticks without Python. The three parts of a tick come as function pointers, not
-as inlined code: the loop is compiled once for every rig, its compiled form can be kept on disk, and it never holds an
-outdated copy of a part.
+A tick reads the sensors (sense), decides the force (govern) and applies it (advance). `CompiledRunner` runs whole
+blocks of ticks of a simulated device without Python; `stepped_runner` drives real devices. The parts of a tick are
+passed as function pointers, not inlined: one loop is compiled for all rigs, its machine code can be kept on disk, and
+it never contains an outdated copy of a part.
 """
 
 from typing import Any, Protocol
@@ -21,19 +22,21 @@ from study.devices.rig import READING_SIZE, CompiledRig
 _NOISE = types.uint64[::1]
 """State of a sensor's random numbers, `CompiledRig.noise`."""
 _SENSE = types.FunctionType(types.void(VECTOR, VECTOR, _NOISE, VECTOR))
-"""Types of the function pointers to the parts of a tick."""
+"""Type of the pointer to `CompiledRig.sense`; the other parts of a tick follow."""
 _TICK = types.FunctionType(TICK_SIGNATURE)
 _PUBLISH = types.FunctionType(PUBLISH_SIGNATURE)
 _ADVANCE = types.FunctionType(types.void(VECTOR, VECTOR, VECTOR))
 _RIG = types.Tuple((VECTOR, VECTOR, _NOISE, VECTOR))  # type: ignore[no-untyped-call]
-"""Grouped arguments of `run_block`."""
+"""Type of the argument `rig` of `run_block`."""
 _GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR, ROWS))  # type: ignore[no-untyped-call]
+"""Type of the argument `governor` of `run_block`."""
 
 
 class Part(types.WrapperAddressProtocol):
-    """A compiled function as a function pointer that is looked up once.
+    """A compiled function as a function pointer whose address is looked up once.
 
-    numba looks a plain one up anew at every call of the loop: 0.3 ms, as long as a hundred ticks take.
+    For a plain function numba looks the address up at every call of the loop, which takes 0.3 ms, as long as a hundred
+    ticks.
     """
 
     def __init__(self, function: Any, pointer_type: Any) -> None:
@@ -45,7 +48,7 @@ class Part(types.WrapperAddressProtocol):
         return int(self._address)
 
     def signature(self) -> Any:
-        """numba's signature of the function. Part of numba's protocol of such pointers."""
+        """numba's signature of the function; required by numba's protocol `WrapperAddressProtocol`."""
         return self._signature
 
 
@@ -64,16 +67,17 @@ _BLOCK = types.void(_SENSE, _TICK, _ADVANCE, _PUBLISH, _RIG, _GOVERNOR, types.in
 def run_block(  # noqa: PLR0913 - compiled code takes function pointers one by one
     sense: Any, govern: Any, advance: Any, publish: Any, rig: Any, governor: Any, ticks: int
 ) -> None:
-    """Run at most `ticks` ticks, fewer if all is over before. rig = (state, parameters, noise) of the CompiledRig and
-    room for a reading; governor = (state, settings, loop, buffer, force) of `study.devices.governor.govern.tick`, and
-    the telemetry ring; sense, govern, advance: `parts`; publish: `PUBLISHED`."""
+    """Run at most `ticks` ticks, fewer if the force is off for good before. rig = (state, parameters, noise) of the
+    CompiledRig, and an array for the reading; governor = (state, settings, loop, buffer, force) of
+    `study.devices.governor.govern.tick`, and the telemetry ring. sense, govern, advance: from `parts`; publish:
+    `PUBLISHED`. All arrays are changed in place."""
     rig_state, parameters, noise, reading = rig
     state, settings, loop, buffer, force, ring = governor
     for _ in range(ticks):
         sense(rig_state, parameters, noise, reading)
         over = govern(state, settings, loop, buffer, reading, force)
         advance(rig_state, parameters, force)
-        if ring.shape[0] > 1:  # a call for nothing would cost half as much as all the rest of a simple rig
+        if ring.shape[0] > 1:  # no ring: an empty call would cost half of the time of a simple rig's tick
             publish(state, settings, ring, reading)
         if over:
             break
@@ -83,55 +87,60 @@ class Runner(Protocol):
     """Interface of a runner: runs the ticks of a rig, and ends its force when the rig fails."""
 
     catches_up: bool
-    """Whether ticks that are late can still be run: a simulated world waits, a real one does not."""
+    """Whether late ticks can still be run: True for a simulated device, whose time waits; False for a real device."""
     failure: BaseException | None
-    """What took the rig away, if it is gone."""
+    """The exception because of which the rig can no longer be used; None while it can."""
     force_off: bool
-    """False if the last zero force may not have reached the rig."""
+    """False if the last command of zero force may not have reached the rig."""
     disconnected: bool
-    """False if the rig was closed and did not take it, or not in time."""
+    """False if the rig was to be closed but failed to close, or not in time."""
 
     @property
     def moving(self) -> bool:
-        """Whether the governor still moves the device, or the rig has not had its last zero."""
+        """Whether the governor still commands a force, or the rig has not received its last zero force."""
         ...
 
     @property
     def seen(self) -> LastReading | None:
-        """The last reading, by a tick or a glance. None before that, and where the rig is gone. From any thread."""
+        """The last reading of `run` or `glance`; None before the first, and when the rig has failed. May be read from
+        any thread."""
         ...
 
     def prepare(self) -> None:
-        """Between the governor's beginning and the first tick."""
+        """Prepare the rig. Called after the governor has begun a stimulus and before its first tick."""
         ...
 
     def glance(self) -> None:
-        """Read once while nothing moves, and write nothing. Never raises. Only in the thread that runs the ticks."""
+        """Read the sensors once while nothing moves, without writing a force. Never raises. To be called only in the
+        thread that runs the ticks."""
         ...
 
     def run(self, ticks: int) -> None:
-        """Run at most this many ticks, fewer if all is over before. Never raises for a failing rig: see `failure`."""
+        """Run at most this many ticks, fewer if the force is off for good before. Never raises for a failing rig, which
+        is reported in `failure`."""
         ...
 
     def drop(self, fault: Fault) -> None:
-        """Force off at once; the rig stays. Only where no tick is under way."""
+        """Force off at once with this fault; the rig stays usable. To be called only while no tick runs."""
         ...
 
     def give_up(self, failure: BaseException) -> None:
-        """The rig, or the loop around it, is gone: force off, for good. Never raises. From any thread."""
+        """Force off permanently, because the rig or its loop has failed. Never raises. May be called from any
+        thread."""
         ...
 
     def cut(self) -> None:
-        """Emergency stop, past a loop that does not hear it: force off, for good. Never raises. From any thread."""
+        """Emergency stop that bypasses a loop that no longer responds: force off permanently. Never raises. May be
+        called from any thread."""
         ...
 
     def disconnect(self) -> None:
-        """Force off, for good. Never raises. May be called twice."""
+        """Force off permanently, at the end of the use of the rig. Never raises. May be called twice."""
         ...
 
 
 class CompiledRunner:
-    """A simulated rig, in compiled blocks. Its force is off as soon as no block runs."""
+    """Runner of a simulated rig, in compiled blocks of ticks. Its force is off as soon as no block runs."""
 
     catches_up = True
     force_off = disconnected = True
@@ -140,13 +149,13 @@ class CompiledRunner:
         self._parts = parts(rig.sense, rig.advance)
         self._rig = rig
         self._arrays = (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE))
-        # Of its own: how often it is looked at must not change what is recorded.
+        # Separate random numbers: the number of glances must not change what is recorded.
         self._glance_noise = ~rig.noise
         self._seen: LastReading | None = None
         self._governor = governor
         self._block_ticks = block_ticks
         self.failure: BaseException | None = None
-        self._run_block(0)  # compiled now, not when a stimulus is due
+        self._run_block(0)  # compile now, not when a stimulus is due
 
     @property
     def moving(self) -> bool:
@@ -157,13 +166,13 @@ class CompiledRunner:
         return self._seen if self.failure is None else None
 
     def prepare(self) -> None:
-        """Tells the rig what will be played (`CompiledRig.prepare`)."""
+        """Tell the rig what will be played (`CompiledRig.prepare`): rows, whether they repeat, and wait (ticks)."""
         state = self._governor.state
         repeats, wait = bool(np.isinf(state[cells.LENGTH])), int(state[cells.LEAD] - state[cells.TICK])
         self._rig.prepare(self._governor.steady, repeats, wait)
 
     def glance(self) -> None:
-        """Reads with random numbers of its own: how often it is called changes no recording."""
+        """Read with separate random numbers, so that the number of calls changes no recording."""
         rig, reading = self._rig, np.zeros(READING_SIZE)
         try:
             rig.sense(rig.state, rig.parameters, self._glance_noise, reading)
@@ -183,7 +192,7 @@ class CompiledRunner:
             self.give_up(error)
 
     def drop(self, fault: Fault) -> None:
-        """End with this fault; one more tick is run, in which the rig is given zero force."""
+        """End with this fault, and run one more tick, in which the rig receives zero force."""
         self._governor.abandon(fault)
         self._run_block(1)
 
@@ -192,7 +201,7 @@ class CompiledRunner:
         self._governor.abandon(Fault.LOST)
 
     def cut(self) -> None:
-        """Nothing to do: no block is long, and the stop is taken at each tick of it."""
+        """Nothing to do: blocks are short, and the governor obeys a stop at each tick of a block."""
 
     def disconnect(self) -> None:
         if self._governor.moving:

@@ -1,6 +1,7 @@
-"""Bindings of the vendor's functions by ctypes: a negative return value becomes an error with the library's own text.
+"""Bindings of Force Dimension's DHD functions by ctypes: loading, signatures, version, and error handling.
 
-The library keeps its last error per thread, so the text is fetched at once, in the thread whose call failed.
+A negative return value becomes a `LibraryError` with the library's own text. The library keeps its last error per
+thread, so that the text must be fetched at once, in the thread whose call failed.
 """
 
 import ctypes
@@ -16,21 +17,21 @@ from study.devices.native import address_of
 from study.errors import DeviceError
 
 OLDEST_SDK = (3, 16, 0)
-"""Oldest version of the vendor's library that has all functions with the types below."""
+"""Oldest version of the vendor's library that is accepted: it has all functions below, with these types."""
 
 GEOMETRY_ERROR, DEVICE_IN_USE = 8, 20
-"""Error codes of the library on which a decision depends."""
+"""Error codes of the library that callers handle in a particular way."""
 
 HIGHEST_NOTICE = 2
-"""Answers from 1 to this tell something beside success (`handle.STALE`, `handle.SCALED`). What a higher one means is
-not known, so it is an error."""
+"""Highest return value that means success with a notice, from 1 on (`handle.STALE`, `handle.SCALED`). The meaning of a
+higher value is not known, so it is treated as an error."""
 
 ANSWER_A_NUMBER = ("dhdOpenID", "dhdGetSystemType")
-"""Functions whose answer, where it is not negative, is what was asked for."""
+"""Functions whose non-negative return value is the result itself, not a status."""
 
 _ID, _NUMBER, _NUMBERS = c_byte, c_double, POINTER(c_double)
 _THREE = (_NUMBERS, _NUMBERS, _NUMBERS, _ID)
-"""Arguments of functions that give a vector: x, y, z, device."""
+"""Argument types of functions that write a vector: pointers to x, y, z, then the device's ID."""
 
 SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdErrorGetLast": (c_int, ()),
@@ -62,7 +63,8 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdSetWatchdog": (c_int, (c_ubyte, _ID)),
     "dhdGetWatchdog": (c_int, (POINTER(c_ubyte), _ID)),
 }
-"""Result and arguments of each function; `char ID` is the last argument and has no default in C."""
+"""Types of result and arguments of each required function. The device's ID (`char`) is the last argument; C has no
+default for it."""
 
 _ANGLES, _COUNTS = (_NUMBER,) * 3, (c_int,) * 3
 
@@ -75,11 +77,11 @@ LINKAGE_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdJointAnglesToInertiaMatrix": (c_int, (_NUMBERS, _NUMBERS, _ID)),
     "dhdJointAnglesToGravityJointTorques": (c_int, (_NUMBERS, _NUMBERS, c_ubyte, _ID)),
 }
-"""Functions for the calibration of the linkage alone: a library without them can drive a device."""
+"""Functions that only the calibration of the linkage needs: a library without them can still drive a device."""
 
 
 class LibraryError(Exception):
-    """A function of the library answered that it failed."""
+    """A function of the library reported a failure: its name, the error code and the library's text."""
 
     def __init__(self, function: str, code: int, text: str) -> None:
         super().__init__(f"{function}: {text} (error {code})")
@@ -102,21 +104,21 @@ class Library:
         return _version_words(self.version)
 
     def function(self, name: str) -> Callable[..., Any]:
-        """Unchecked, for calls at every tick: what it returns is for `check_answer` to judge. Raises `DeviceError`
-        where a function that not every use needs is missing."""
+        """The bare function, for calls at every tick; its return value must be passed to `check_answer`. Raises
+        `DeviceError` where the library lacks this function."""
         if name not in self._functions:
             raise _too_old(f"{self.path} has no {name}")
         return self._functions[name]
 
     def check_answer(self, name: str, answer: int) -> int:
-        """The answer. Raises `LibraryError` where it is below zero, or unknown; to be asked in the thread of the
-        call."""
+        """Return `answer`, the value that function `name` returned. Raises `LibraryError` where it is negative or
+        unknown. Must run in the thread of the call, because the error is kept per thread."""
         if 0 <= answer <= HIGHEST_NOTICE or (answer > 0 and name in ANSWER_A_NUMBER):
             return answer
         raise self.last_error(name)
 
     def last_error(self, name: str) -> LibraryError:
-        """The error of this function, whose call just failed in this thread."""
+        """The library's error of function `name`, whose call has just failed in this thread."""
         code = int(self._functions["dhdErrorGetLast"]())
         if code == 0:
             return LibraryError(name, code, "an answer that is neither success nor a known error")
@@ -124,14 +126,16 @@ class Library:
         return LibraryError(name, code, text.decode("utf-8", "replace"))
 
     def addresses(self, names: tuple[str, ...]) -> npt.NDArray[np.int64]:
-        """Addresses of the library's functions, for calls from compiled code."""
+        """(len(names),): addresses of the library's functions, for calls from compiled code."""
         return np.array([address_of(self._functions[name]) for name in names], dtype=np.int64)
 
     def call(self, name: str, *arguments: Any) -> int:
-        """Call a function of the library. Raises `LibraryError`."""
+        """Call a function of the library and check its return value. Raises `LibraryError`, and `DeviceError` where the
+        library lacks the function."""
         return self.check_answer(name, int(self.function(name)(*arguments)))
 
     def _version(self) -> tuple[int, int, int, int]:
+        """Version of the SDK: major, minor, release, revision."""
         parts = [c_int() for _ in range(4)]
         self._functions["dhdGetSDKVersion"](*map(ctypes.byref, parts))
         major, minor, release, revision = (part.value for part in parts)
@@ -139,8 +143,9 @@ class Library:
 
 
 def _load(path: Path) -> ctypes.CDLL:
+    """Load the library. Raises DeviceError."""
     try:
-        # Windows looks for what it needs itself beside a library only where that is named in full.
+        # Windows searches a library's own folder for the libraries it depends on only if its full path is given.
         return ctypes.CDLL(str(path.absolute()))
     except OSError as error:
         raise DeviceError(
@@ -152,6 +157,8 @@ def _load(path: Path) -> ctypes.CDLL:
 
 
 def _bind(loaded: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
+    """The library's functions by name, with their types set. Raises DeviceError where a required function is
+    missing."""
     missing = [name for name in SIGNATURES if not hasattr(loaded, name)]
     if missing:
         raise _too_old(f"{path} has no {', '.join(missing)}")
@@ -165,10 +172,12 @@ def _bind(loaded: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
 
 
 def _version_words(version: tuple[int, ...]) -> str:
+    """Text of a version, such as 3.17.5.0."""
     return ".".join(map(str, version))
 
 
 def _too_old(happened: str) -> DeviceError:
+    """Error for a library that is too old. happened: what shows it."""
     return DeviceError(
         "The device's library is too old",
         f"{happened}.",

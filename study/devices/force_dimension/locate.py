@@ -1,4 +1,8 @@
-"""Locates the vendor's library on this computer, where its installer and its own tools put it."""
+"""Locates the library of Force Dimension's SDK (libdrd or libdhd) on this computer.
+
+The folders named by environment variables are searched first, then those in which the vendor's installer and tools put
+the library on Windows, macOS and Linux.
+"""
 
 import platform
 import sys
@@ -7,22 +11,24 @@ from dataclasses import dataclass
 from pathlib import Path
 
 SDK_VARIABLES = ("FDSDK", "FORCEDIM_SDK")
-"""Environment variables that name the SDK's folder; the second is the older."""
+"""Environment variables that name the SDK's folder, in order of preference; the second is the older name."""
 
 WINDOWS_FOLDERS = (("LOCALAPPDATA", "Force Dimension"), ("ProgramFiles", "Force Dimension"))
-"""Environment variable, and the folder below it that holds sdk-*."""
+"""Windows: environment variable of a folder, and its subfolder that contains the folders sdk-VERSION."""
 
 
 @dataclass(frozen=True, slots=True)
 class Computer:
-    """What decides where the vendor's library is searched."""
+    """Facts about a computer that determine where the vendor's library is searched."""
 
     system: str
     """As sys.platform: linux, darwin, win32."""
     machine: str
     """As platform.machine()."""
     environ: Mapping[str, str]
+    """Environment variables."""
     home: Path
+    """The user's home folder."""
 
 
 def this_computer(environ: Mapping[str, str]) -> Computer:
@@ -31,18 +37,21 @@ def this_computer(environ: Mapping[str, str]) -> Computer:
 
 
 def find_library(computer: Computer) -> Path | None:
-    """libdrd before libdhd: it holds all of the other's functions and the automatic calibration besides."""
+    """Path of the newest library in the first folder that has any; None where none is found. In each folder libdrd
+    comes before libdhd: it has all functions of libdhd and the automatic calibration."""
     return next((path for pattern in library_patterns(computer) if (path := _newest(*pattern)) is not None), None)
 
 
 def library_patterns(computer: Computer) -> Iterator[tuple[Path, str]]:
-    """(folder, file pattern), the most wanted first. A variable that is set is meant: it comes before all else."""
+    """Pairs (folder, file pattern) in order of preference. Folders named by an environment variable come first, because
+    the user chose them."""
     for folder in _folders(computer):
         for library in ("drd", "dhd"):
             yield folder, _file_pattern(library, computer)
 
 
 def _folders(computer: Computer) -> Iterator[Path]:
+    """Folders to search, in order of preference."""
     environ = computer.environ
     roots = [Path(environ[name]) for name in SDK_VARIABLES if environ.get(name)]
     if computer.system == "win32":
@@ -60,16 +69,18 @@ def _folders(computer: Computer) -> Iterator[Path]:
 
 
 def _file_pattern(library: str, computer: Computer) -> str:
+    """Glob pattern of a library's file names. library: drd or dhd."""
     if computer.system == "win32":
         return f"{library}64.dll"
     return f"lib{library}*.dylib" if computer.system == "darwin" else f"lib{library}.so*"
 
 
 def _newest(folder: Path, pattern: str) -> Path | None:
+    """The file with the highest version number that matches the pattern; None where none does."""
     found = [path for path in folder.glob(pattern) if path.is_file()]
     return max(found, key=_version_in, default=None)
 
 
 def _version_in(path: Path) -> tuple[int, ...]:
-    """Numbers in a name: libdrd.so.3.17.5 is newer than libdrd.so.3.9.0, and sdk-3.17.5 than sdk-3.9.0."""
+    """Version as the numbers in a name, so that libdrd.so.3.17.5 counts as newer than libdrd.so.3.9.0."""
     return tuple(int(part) for part in path.name.replace("-", ".").split(".") if part.isdigit())

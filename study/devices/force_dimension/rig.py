@@ -1,7 +1,9 @@
-"""A device of the vendor as a rig: readings, forces, and everything that releases its force.
+"""A Force Dimension device as a `Rig`: readings, forces, and every way to release its force.
 
-Beyond what the safety layer does, a force above the cap or no number is never sent (`tick_io`), and the library is told
-the cap as well. Anything odd ends in an error: the safety layer then writes zero, and the watchdog sees to the rest.
+The compiled functions of `tick_io` do the reading and writing; this class owns their memory cells, the threads and the
+errors. In addition to the safety layer, `tick_io` never sends a force whose norm is above the cap or NaN. Any failure
+is raised as a `DeviceError`: the safety layer then writes a zero force, and if that fails too, the device's watchdog
+switches the force off.
 """
 
 import contextlib
@@ -24,31 +26,33 @@ from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, Compil
 from study.errors import DeviceError
 
 REST_SHARE = 0.25
-"""Share of the watchdog's time between two zeros while nothing is played."""
+"""Interval between two zero forces while nothing is played, as a share of the watchdog's timeout."""
 
 JOIN_S = 0.5
-"""Longest wait for the thread of these zeros to end (s): half of what a caller waits for a device to close."""
+"""Longest wait for the thread that repeats zeros to end (s): half of what a caller waits for a device to close."""
 
 
 class Accelerometer(Protocol):
-    """A sensor at the handle, read by a thread of its own."""
+    """Port of an acceleration sensor at the handle that is read by a thread of its own."""
 
     def latest(self) -> tuple[FloatArray, bool]:
-        """Acceleration (3,), m/s², NaN where there is none of now; whether a channel is at its limit. Cheap."""
+        """Newest acceleration (3,), m/s², NaN without a fresh sample, and whether a channel is at its limit. Fast
+        enough for every tick."""
         ...
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
-        """Sensor reading apart from the position: the port of `study.devices.rig.OwnClockSensor`."""
+        """Accelerations at the times of the ticks, afterwards: see `study.devices.rig.OwnClockSensor`."""
         ...
 
     def close(self) -> None:
-        """Never raises; may be called again."""
+        """Stop reading. Never raises; may be called again."""
         ...
 
 
 class ForceDimensionRig:
-    """cap_n: no force above it is ever sent. rests: repeat the zero while nothing is played, in a thread, so that
-    gravity stays compensated; without it the device brakes between stimuli."""
+    """An opened device. drops_force_after_s: timeout of its watchdog (s), 0 = none. cap_n: largest norm of a force that
+    `write` sends (N). rests: repeat the zero force in a thread while nothing is played, so that gravity stays
+    compensated; without it, the watchdog lets the device brake between stimuli."""
 
     def __init__(
         self,
@@ -69,7 +73,7 @@ class ForceDimensionRig:
         self._cells[loop_cells.NUMBER] = handle.number
         self._cells[loop_cells.CAP_N] = min(cap_n, info.max_force_n)
         self._cells[loop_cells.DROPS_AFTER_S] = drops_force_after_s
-        # How long ago the device got its last zero is not known: it is asked before the first force.
+        # The time of the last zero is unknown, so that the first force checks the status of the device.
         self._cells[loop_cells.SENT_S], self._cells[loop_cells.SENT_ZERO] = -math.inf, 1.0
         shared: FloatArray | None = getattr(accelerometer, "samples", None)
         self._samples: FloatArray = np.zeros((1, 1)) if shared is None else shared
@@ -88,7 +92,8 @@ class ForceDimensionRig:
         return CompiledIo(tick_io.sense_once, tick_io.write_once, self._calls, self._cells, self._samples, self._error)
 
     def sense(self) -> FloatArray:
-        """The acceleration stands in it as by the newest sample; NaN without a fresh one."""
+        """A reading, shape (READING_SIZE,), with the newest acceleration; NaN without a fresh sample. Raises
+        `DeviceError` where the device fails or only repeats its position."""
         reading = np.empty(READING_SIZE)
         self._raise_for(tick_io.sense_once(self._calls, self._cells, self._samples, reading))
         if self._overlaid is not None:
@@ -97,34 +102,36 @@ class ForceDimensionRig:
         return reading
 
     def buttons(self) -> frozenset[int]:
+        """Numbers of the pressed buttons, from 0, at the last status check."""
         mask = int(self._cells[loop_cells.PRESSED])
         return frozenset(bit for bit in range(32) if mask >> bit & 1)
 
     def write(self, force_n: FloatArray) -> None:
-        """A zero is sent in any case. Raises `study.errors.DeviceError` after a failure, and for a force above the cap,
-        in whose place a zero is sent."""
+        """Command a force (3,), N. A zero force is sent even after a failure. Raises `study.errors.DeviceError` after a
+        failure, and for a force above the cap or NaN, in place of which a zero is sent."""
         self._raise_for(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
+        """Accelerations at the ticks, by the sensor's own clock; None without an accelerometer."""
         return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
 
     def withhold(self, seconds: float) -> float:
-        """Simulates a stopped loop: sends nothing for this long, not even zeros. Returns the time of the last force,
-        s."""
+        """Simulate a stopped control loop, to test the watchdog: nothing is sent for this long, not even zeros. Returns
+        the time of the last force (s, monotonic clock)."""
         with self._sending:
             self._cells[loop_cells.WITHHELD_UNTIL_S] = time.monotonic() + seconds
             return float(self._cells[loop_cells.SENT_S])
 
     def force_on(self) -> bool:
-        """Whether the device takes forces just now, as it says. From any thread. Raises `DeviceError`."""
+        """Whether the device reports that its forces are on. May be called from any thread. Raises `DeviceError`."""
         try:
             return self._handle.status().force_on
         except LibraryError as error:
             raise self._fail(f"The library says: {error}") from error
 
     def given_n(self) -> float:
-        """The horizontal force that the device says it gives just now: the vertical one may hold up its weight. Raises
-        `DeviceError`."""
+        """Norm of the horizontal force (N) that the device reports at this moment; the vertical force is left out,
+        because it may compensate gravity. Raises `DeviceError`."""
         try:
             x, y, _ = self._handle.force_n()
         except LibraryError as error:
@@ -132,8 +139,9 @@ class ForceDimensionRig:
         return math.hypot(x, y)
 
     def given_past_this_n(self, asked_n: float) -> float:
-        """Force (N) that the device gives when asked for `asked_n` along x, past the cap of this file; zero follows at
-        once. For the acceptance only, with no hand on the handle. Raises `DeviceError`."""
+        """Horizontal force (N) that the device reports when `asked_n` (N) is sent along x without the cap of this rig,
+        to test the cap of the library; a zero follows at once. Only for the acceptance test of a device, with no hand
+        on the handle. Raises `DeviceError`."""
         with self._sending:
             try:
                 self._handle.set_force(asked_n, 0.0, 0.0)
@@ -145,7 +153,7 @@ class ForceDimensionRig:
                     self._handle.set_force(0.0, 0.0, 0.0)
 
     def close(self) -> bool:
-        """Release and close the device and its accelerometer. Returns whether the library confirmed it."""
+        """Release and close the device and its accelerometer. Returns whether the library confirmed the release."""
         self._cells[loop_cells.WITHHELD_UNTIL_S] = 0.0
         self._cells[loop_cells.CLOSED] = 1.0
         self._closed.set()
@@ -161,8 +169,9 @@ class ForceDimensionRig:
         return bool(self._cells[loop_cells.LET_GO])
 
     def _end_resting(self) -> None:
-        """Wait for the thread of the zeros, once force and brakes are done with: a call that hangs there holds up
-        neither. What it still did is taken back where the device would not disconnect."""
+        """Wait for the thread that repeats zeros, after the force is off and the brakes are on, so that a hanging call
+        of that thread delays neither. The second disconnect undoes what such a call did late; if it fails, the release
+        does not count as confirmed."""
         if self._resting.ident is None or self._resting is threading.current_thread():
             return
         self._resting.join(JOIN_S)
@@ -170,8 +179,9 @@ class ForceDimensionRig:
             self._cells[loop_cells.LET_GO] = 0.0
 
     def _repeat_zero_force(self) -> None:
-        """Repeat a zero force. Never sends one between two forces, nor anything after a failure. As the loop, before
-        other programs: a program that goes before this thread while it sends would hold up the loop's next force."""
+        """Repeat a zero force until closed or failed; a zero is sent only where the last force was zero. Has real-time
+        priority like the control loop: if it were interrupted while it holds the lock, the loop's next force would
+        wait."""
         every_s, zero = REST_SHARE * self.drops_force_after_s, np.zeros(3)
         with real_time_class():
             while not self._closed.wait(every_s) and self._cells[loop_cells.FAILED] == 0.0:
@@ -180,15 +190,17 @@ class ForceDimensionRig:
                     self._error(code)
 
     def _raise_for(self, code: int) -> None:
+        """Raise the error of a code of `tick_io` other than 0."""
         if code:
             raise self._error(code)
 
     def _error(self, code: int) -> DeviceError:
-        """The error of a code; called in the thread that got the code, because the library keeps its last error per
-        thread."""
+        """The error of a code. Must be called in the thread that got the code, because the library stores its last
+        error per thread."""
         return self._failure or self._fail(self._error_text(int(self._cells[loop_cells.FAILED]) or code))
 
     def _error_text(self, code: int) -> str:
+        """Description of a failure, without a full stop. code: as in `loop_cells`."""
         function = code - loop_cells.OF_LIBRARY
         if 0 <= function < len(loop_cells.LIBRARY):
             return f"The library says: {self._handle.library.last_error(loop_cells.LIBRARY[function])}"
@@ -204,7 +216,7 @@ class ForceDimensionRig:
         }[code]
 
     def _fail(self, happened: str) -> DeviceError:
-        """The first failure stays: the next call says the same."""
+        """Record a failure and return its error. Only the first failure is kept: later calls return the same error."""
         if self._failure is None:
             self._cells[loop_cells.FAILED] = self._cells[loop_cells.FAILED] or loop_cells.SAID
             self._failure = DeviceError(

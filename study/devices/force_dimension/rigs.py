@@ -1,4 +1,8 @@
-"""Builds the rig of a named device: library, device, watchdog and its test, gravity compensation."""
+"""Opens a Force Dimension device by name and makes it ready for a study.
+
+Order: load the vendor's library, open the accelerometer and the device, check its identity and its acceptance, set
+force limit, gravity compensation and watchdog, test the watchdog. After a failure everything is closed again.
+"""
 
 import math
 import time
@@ -18,12 +22,12 @@ from study.devices.force_dimension.watchdog_check import check_watchdog
 from study.errors import DeviceError
 
 RATE_HZ = 1000.0
-"""Rate of the loop (Hz)."""
+"""Rate of the force loop (Hz), and of its samples."""
 
 
 def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:
-    """Open a device of the vendor by name, with calibration, watchdog and gravity compensation. Raises `DeviceError`
-    that says what is missing. What was opened until then is stopped and closed again."""
+    """Open a device of the vendor by the name of its model (`MODELS`), with watchdog and gravity compensation. Raises
+    `DeviceError` with the reason; device and accelerometer are then stopped and closed."""
     model, lab = MODELS[name], read_lab()
     library = load_library()
     sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None and settings.with_sensor else None
@@ -42,6 +46,7 @@ def _rig(
     sensor: Accelerometer | None,
     settings: DeviceSettings,
 ) -> ForceDimensionRig:
+    """Open the device and make it ready. After any error the device is disconnected. Raises `DeviceError`."""
     handle = open_model(library, model)
     try:
         info = replace(info_of(handle, library, model, lab.effective_mass_kg), has_sensor=sensor is not None)
@@ -49,6 +54,7 @@ def _rig(
             check_accepted(info, datetime.now(UTC).date())
         cap_n = min(settings.limits.total_cap_n, model.max_force_n)
         drops_after_s = make_ready(handle, model, cap_n, lab.effector_mass_kg)
+        # drops_after_s: time (s) after which the device's watchdog drops the force; 0 without a watchdog.
         if drops_after_s > 0:
             check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
@@ -61,8 +67,9 @@ def _rig(
 
 
 def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
-    """Facts about an open device. Raises `LibraryError`, and `DeviceError` where its firmware or serial number is not
-    known: an acceptance that is void for another would then hold for every one."""
+    """Facts about an open device. effective_mass_kg: of the laboratory's settings; None for the model's. Raises
+    `LibraryError`, and `DeviceError` without a firmware or serial number: an acceptance holds for one device only, and
+    could not be assigned."""
     firmware, serial = handle.firmware(), handle.serial()
     if not 0 < firmware < math.inf:
         raise _unknown_error(model, "firmware", f"gives {firmware:g} as the version")
@@ -79,6 +86,7 @@ def info_of(handle: Handle, library: Library, model: DeviceModel, effective_mass
 
 
 def _unknown_error(model: DeviceModel, what: str, said: str) -> DeviceError:
+    """Error for an unknown fact of the device. what: the fact; said: what the library gave instead, as a predicate."""
     return DeviceError(
         f"The {model.name} does not say its {what}",
         f"Its library {said}, so no acceptance can be known to hold for it. Nothing has moved.",

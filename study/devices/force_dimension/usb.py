@@ -1,7 +1,7 @@
-"""Force Dimension devices on the USB, and whether this account may open them, read from Linux (/sys/bus/usb).
+"""Lists the Force Dimension devices on the USB, and whether this account may open them (Linux, /sys/bus/usb).
 
-The vendor's library cannot see a device that it may not open, as if it were not plugged in; this tells the two cases
-from one another, for the message of the device check.
+The vendor's library does not see a device that it may not open, just as if it were not plugged in. The device check
+uses this list to distinguish the two cases in its message.
 """
 
 import os
@@ -18,6 +18,7 @@ ADVICE = (
     f"Write the line {RULE} into {RULE_FILE} as administrator, run `sudo udevadm control --reload`, then unplug "
     "the device and plug it in again."
 )
+"""Instruction for the user where a device may not be opened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,7 @@ def find_usb_devices(
     devices: Path = Path("/sys/bus/usb/devices"), nodes: Path = Path("/dev/bus/usb")
 ) -> tuple[UsbDevice, ...] | None:
     """Force Dimension devices that are plugged in; None where this system cannot list them (not Linux). devices: folder
-    with a folder per USB device. nodes: folder of the device files, by bus and number."""
+    with one folder per USB device. nodes: folder of the device files, BUS/NUMBER with three digits each."""
     if not devices.is_dir():
         return None
     found = []

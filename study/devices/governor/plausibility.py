@@ -1,7 +1,9 @@
-"""Whether a reading of the position can be a handle's: where it is, how it got there, and whether it follows the force.
+"""Plausibility of position readings at every tick: workspace, step length, acceleration, and stale (frozen) readings.
 
-The bounds and their reasons: `protocols.definition.plausibility`. What passes may still be wrong; then it pulls with
-the feedback's cap at the most.
+Spring and damper turn a false position into force, so that an implausible reading releases the force. A reading is
+stale if it does not change although the force must have moved even a firmly gripped handle, which is simulated as
+m a + b v + k x = F after dry friction. Bounds and their reasons: `protocols.definition.plausibility`. A false reading
+within them causes at most the feedback's force limit.
 """
 
 import math
@@ -53,29 +55,31 @@ from study.devices.governor.compiling import part
 from study.devices.governor.confine import is_bounded, norm_of
 
 IMPLAUSIBLE_M = 0.5
-"""A reading beyond this counts as no number at all."""
+"""A reading (m) with a component beyond this is treated as invalid, like NaN."""
 
 GRIPPED_KG, GRIPPED_N_S_PER_M, GRIPPED_N_PER_M = 1.0, 60.0, 3000.0
-"""A handle in a hard grip moves no less than this. A whole arm has 0.55 kg, 6.5 N s/m, 135 N/m (Sci. Rep. srep18004),
-a hard grip some 20 times that stiffness."""
+"""Mass, damping and stiffness of a handle in a hard grip; a real handle moves no less. A whole arm has 0.55 kg,
+6.5 N s/m, 135 N/m (Sci. Rep. srep18004), a hard grip some 20 times that stiffness."""
 
 AXIS_TIMES, AXIS_STRETCHES = 4.0, 2
-"""An axis by itself is looked at in stretches of so many times what makes the whole position stale, and must have been
-expected to move in each of so many in a row: while the others move, the linkage's friction holds an axis for longer."""
+"""Length of the stretches over which a single axis is tested, in units of `STALE_TICKS`, and number of successive
+stretches, in each of which a motion must be expected, that make it stale. They are longer than for the whole position
+because friction of the linkage can hold one axis while the others move."""
 
 MOVING_BELOW_HZ = 80.0
-"""Corner of the two low-passes before the expected motion. Faster forces move a gripped handle by less than a step of
-the resolution; dry friction, computed at the rate of the loop, would make a drift of them that no handle follows."""
+"""Corner frequency of the two first-order low-passes before the expected motion. Faster forces move a gripped handle by
+less than the resolution; the friction model, computed at the loop rate, would turn them into a drift that does not
+occur."""
 
 STEPS_OF_RESOLUTION = 2.0
-"""Between the differences of three readings that are each wrong by half a step; and so far must a handle be expected
-to have moved, before a reading that did not change is stale."""
+"""Largest effect of quantisation, in units of the resolution, on the second difference of three readings, each wrong by
+half a step. Also the expected motion from which an unchanged reading is stale."""
 
 
 @part
 def _move_gripped(state: FloatArray, tick_s: float, force_n: float, at: tuple[int, int, int, int]) -> None:
-    """Move the gripped handle along an axis for a tick, and widen the range in which it was. at: cells of position,
-    speed, least and most position."""
+    """Integrate the gripped handle along one axis over a tick (semi-implicit Euler), and extend its range. force_n: N.
+    at: indices of position (m), velocity (m/s), least and greatest position in `state`."""
     place, speed, least, most = at
     left = force_n - GRIPPED_N_PER_M * state[place]
     left -= GRIPPED_N_S_PER_M * state[speed]
@@ -87,9 +91,9 @@ def _move_gripped(state: FloatArray, tick_s: float, force_n: float, at: tuple[in
 
 @part
 def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
-    """Update the motion expected of the gripped handle in the last tick, by the stimulus: a hand at rest has held
-    before what it holds now. Dry friction passes only the part of a force that exceeds the last one that moved the
-    handle (Prandtl's play operator)."""
+    """Update the motion that the stimulus must have caused in a gripped handle over the last tick. Static forces are
+    left out: a hand at rest balances them. Dry friction follows the play operator (Prandtl): the force that moves the
+    handle changes only where the stimulus differs from it by more than the friction."""
     for i in range(3):
         state[PASSED + i] += settings[PASSED_SHARE] * (state[EXCITATION + i] - state[PASSED + i])
         state[PASSED_TWICE + i] += settings[PASSED_SHARE] * (state[PASSED + i] - state[PASSED_TWICE + i])
@@ -108,7 +112,8 @@ def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
 
 @part
 def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
-    """Since the reading that was the last to change. Then it is that one itself."""
+    """Whether the reading differs by half the resolution or more from the reference, the last reading that had changed.
+    If so, it becomes the new reference, and the expected range starts anew."""
     away = norm_of(reading[0] - state[CHANGED], reading[1] - state[CHANGED + 1], reading[2] - state[CHANGED + 2])
     if away < 0.5 * settings[RESOLUTION]:
         return False
@@ -121,13 +126,15 @@ def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -
 
 @part
 def _gave_way(state: FloatArray, settings: FloatArray, way: float) -> bool:
-    """Whether so much of the spring's pull was taken back that it must have moved even a gripped handle."""
+    """Whether the spring's force has been reduced so far, since the last change, that even a gripped handle must have
+    moved by `way` (m): by more than friction + stiffness of the grip * way."""
     taken_back = (state[EASED] - state[EASED_BEFORE]) * state[PULL]
     return bool(taken_back > settings[FRICTION] + GRIPPED_N_PER_M * way)
 
 
 @part
 def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
+    """Whether the position has not changed for `STALE_TICKS`, although a gripped handle must have moved."""
     if _has_changed(state, settings, reading):
         state[UNCHANGED] = 0.0
         return False
@@ -139,7 +146,7 @@ def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> b
 
 @part
 def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
-    """As `_expect_motion`, for an axis by itself: its share of the force must exceed the friction alone."""
+    """As `_expect_motion` for axis i by itself, with the full friction on its component of the force."""
     beyond = state[PASSED_TWICE + i] - state[AXIS_FORCE + i]
     if abs(beyond) > settings[FRICTION]:
         state[AXIS_FORCE + i] += beyond - math.copysign(settings[FRICTION], beyond)
@@ -149,7 +156,8 @@ def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
 
 @part
 def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
-    """Whether an axis has not changed although its share of the force must have moved it, while the others move on."""
+    """Whether the reading of a single axis is stale: unchanged although its component of the force must have moved
+    it."""
     stale, stretch, half = False, AXIS_TIMES * settings[STALE_TICKS], 0.5 * settings[RESOLUTION]
     for i in range(3):
         _expect_along_axis(state, settings, i)
@@ -169,9 +177,10 @@ def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray)
 
 @part
 def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: float) -> bool:
-    """x, y, z: the present step, in m per tick."""
+    """Whether the low-passed acceleration of the readings exceeds its bound. x, y, z: the latest step, in m per
+    tick."""
     last = state[LAST_STEP]
-    if not math.isnan(last):  # as it is before the second reading
+    if not math.isnan(last):  # NaN before the second reading
         change = norm_of(x - last, y - state[LAST_STEP + 1], z - state[LAST_STEP + 2])
         change = max(0.0, change - STEPS_OF_RESOLUTION * settings[RESOLUTION])
         acceleration = change / (settings[TICK_S] * settings[TICK_S])
@@ -182,7 +191,8 @@ def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: f
 
 @part
 def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArray) -> int:
-    """NO_FAULT, or why the force must be let go. LAST_POSITION and ELAPSED say what was before."""
+    """NO_FAULT, or the code of the fault for which the force must be released. reading: (3,), m. `state` holds the last
+    position and the ticks since then (LAST_POSITION, ELAPSED)."""
     if not is_bounded(reading, IMPLAUSIBLE_M):
         return NOT_A_NUMBER
     if not norm_of(reading[0], reading[1], reading[2]) <= settings[WORKSPACE]:
@@ -194,7 +204,7 @@ def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArra
             state[AXIS_CHANGED + i] = reading[i]
         return NO_FAULT
     x, y, z = reading[0] - last_x, reading[1] - state[LAST_POSITION + 1], reading[2] - state[LAST_POSITION + 2]
-    # Driver and loop have clocks of their own: readings may be a tick apart, though they were taken one after another.
+    # Driver and loop have separate clocks: successive samples of the driver may seem to be less than a tick apart.
     ticks = max(1.0, state[ELAPSED])
     way = norm_of(x, y, z)
     if not (way <= settings[LONGEST_JUMP] and way <= settings[FASTEST_STEP] * ticks + settings[RESOLUTION]):

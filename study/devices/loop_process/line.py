@@ -1,5 +1,9 @@
-"""Caller's end of a pipe to the loop's process. A thread writes and reads, so that an interrupted caller leaves no half
-message, and waits no longer than its timeout for a process that hangs."""
+"""Caller's end of the pipes to the process of the device loop: remote calls with progress, timeout and cancellation.
+
+Each pipe has a thread that writes and reads, so that an interrupted caller leaves no incomplete message in the pipe and
+waits no longer than its timeout for a process that hangs. Messages are pickled: (name, arguments) as request; (kind,
+value) as progress or answer.
+"""
 
 import contextlib
 import pickle
@@ -19,22 +23,22 @@ else:
     End = Connection
 
 LINES = ("work", "signs", "look", "stop", "close")
-"""A pipe each: neither a long `release`, `play` or `close` nor a reading that hangs holds up a sign of life or a
-stop."""
+"""Names of the pipes, one per group of methods: neither a long `release`, `play` or `close` nor a reading that hangs
+delays a sign of life or a stop."""
 
 VALUE, ERROR, PROGRESS = range(3)
-"""Kinds of messages. After PROGRESS the other side waits for a bool: whether to go on."""
+"""Kinds of messages from the process. After PROGRESS the process waits for a bool: whether to continue."""
 
 
 GRACE_S = 0.5
-"""When this process stood still, the other looks late too: it gets so long to answer."""
+"""Additional wait (s) after a timeout: if this process was suspended, the other only seems late."""
 
 CLOSE_S = 6.0
-"""Time granted beyond the fade to end in order; a driver that hangs is abandoned sooner."""
+"""Time (s) beyond the fade in which the process may end in an orderly way; a driver that hangs is abandoned sooner."""
 
 
 class LoopGoneError(Exception):
-    """The loop's process ended, or hangs."""
+    """The loop's process ended, or hangs (`hangs`: it did not answer within the timeout)."""
 
     def __init__(self, happened: str, hangs: bool) -> None:
         super().__init__(happened)
@@ -42,23 +46,24 @@ class LoopGoneError(Exception):
 
 
 class Call:
-    """One call under way. Raises where the arguments cannot be sent."""
+    """A call of one method in the loop's process. The constructor raises pickle's errors for arguments that cannot be
+    pickled."""
 
     def __init__(self, name: str, arguments: tuple[Any, ...]) -> None:
         self.request = pickle.dumps((name, arguments))
         self.goes_on: SimpleQueue[bool] = SimpleQueue()
         self._progress: SimpleQueue[float] = SimpleQueue()
         self._last: tuple[int, Any] | None = None
-        """Kept, not taken: a caller that was interrupted as it came asks again."""
+        """The answer (kind, value), kept so that a caller that was interrupted on its arrival can ask for it again."""
         self._news = threading.Event()
 
     @property
     def over(self) -> bool:
-        """Answered, or known to be never."""
+        """Whether the answer has arrived, or is known never to arrive."""
         return self._last is not None
 
     def hear(self, message: tuple[int, Any]) -> None:
-        """Take a message of the process: progress, or the answer that ends the call. From the line's thread."""
+        """Take a message of the process: progress, or the answer that ends the call. Called by the line's thread."""
         if message[0] == PROGRESS:
             self._progress.put(message[1])
         else:
@@ -72,9 +77,10 @@ class Call:
         grace_s: float | None = None,
         sending_s: float = 0.0,
     ) -> Any:
-        """patience_s, grace_s (`GRACE_S`): for each message. sending_s: beyond that, before the first progress and
-        after that of 1, when a request and a recording are sent. Raises what was raised there, `LoopGoneError`, and
-        what `on_progress` raises. May be called again when it was interrupted."""
+        """Wait for the answer and return it. patience_s: timeout for each message. grace_s: additional wait, None =
+        `GRACE_S`. sending_s: added to the timeout before the first progress and after a progress of 1, when a request
+        or a recording is sent. Raises what the method raised, `LoopGoneError`, and what `on_progress` raises. May be
+        called again after an interruption."""
         share: float | None = 1.0
         while (share := self._next_progress(patience_s + sending_s * (share == 1.0), grace_s)) is not None:
             if on_progress is not None:
@@ -87,7 +93,7 @@ class Call:
         return value
 
     def break_off(self, patience_s: float) -> None:
-        """Have it end early, and wait until it has. Raises `LoopGoneError`."""
+        """Cancel the call at its next progress, and wait until it has ended. Raises `LoopGoneError`."""
         self.goes_on.put(False)
         while self._next_progress(patience_s) is not None:
             pass
@@ -95,7 +101,7 @@ class Call:
             raise self._last[1]
 
     def _next_progress(self, patience_s: float, grace_s: float | None = None) -> float | None:
-        """The next progress, or None when the call is over."""
+        """The next progress (0 to 1), or None when the call is over, also after both waits without a message."""
         for wait_s in (patience_s, GRACE_S if grace_s is None else grace_s):
             self._news.clear()
             if self._last is None and self._progress.empty():
@@ -109,8 +115,8 @@ class Call:
 
 
 class Line:
-    """A pipe to the loop's process, with a thread that sends its calls in order. A broken pipe ends them with
-    `LoopGoneError`."""
+    """A pipe to the loop's process, with a thread that sends its calls in order. A broken pipe ends every open call
+    with `LoopGoneError`."""
 
     def __init__(self, connection: End, name: str) -> None:
         self._connection = connection
@@ -119,7 +125,8 @@ class Line:
         threading.Thread(target=self._run_thread, name=f"line {name}", daemon=True).start()
 
     def begin(self, name: str, *arguments: Any) -> Call:
-        """Returns at once; sent when all earlier calls of this line are over. Raises where it cannot be sent."""
+        """Queue a call and return at once. It is sent when all earlier calls of this line are over. Raises as `Call`
+        does."""
         call = Call(name, arguments)
         self._calls.put(call)
         if self._ended.is_set():
@@ -127,10 +134,11 @@ class Line:
         return call
 
     def end(self) -> None:
-        """Close the pipe after the calls so far."""
+        """Close the pipe after the calls that were queued before."""
         self._calls.put(None)
 
     def _run_thread(self) -> None:
+        """Send the queued calls one by one, until `end` is called."""
         try:
             with self._connection:
                 while (call := self._calls.get()) is not None:
@@ -143,19 +151,20 @@ class Line:
             self._refuse_all()
 
     def _refuse_all(self) -> None:
-        """Answer with an error the calls that were begun as the pipe closed."""
+        """Answer calls that were queued while the pipe closed with an error."""
         with contextlib.suppress(Empty):
             while True:
                 if (call := self._calls.get_nowait()) is not None:
                     call.hear((ERROR, LoopGoneError("it was given up", hangs=False)))
 
     def _transact(self, call: Call) -> None:
+        """Send a request and pass its messages to the call, until the answer has come."""
         connection = self._connection
         connection.send_bytes(call.request)
         message = connection.recv()
         while message[0] == PROGRESS:
             call.hear(message)
-            # Without a bound: a caller that hangs gives no sign of life, and the force fades.
+            # No timeout: where the caller hangs, its signs of life stop and the device fades the force.
             connection.send(call.goes_on.get())
             message = connection.recv()
         call.hear(message)

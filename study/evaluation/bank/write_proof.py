@@ -1,5 +1,9 @@
-"""Write the results of a blind test: a JSON document, a table with one row per case, a page, and a small table to
-keep."""
+"""Write the results of a blind test of the diagnosis, in which effects are concealed in simulated recordings.
+
+`write_proof` writes into the folder of the test: `proof.json` (all figures), `proof.csv` (one row per case) and
+`report.html`. `write_table` writes the figures and the misses as small CSV tables that can be kept under version
+control. Both state the commit and the digests of the code that answered, so that figures can be traced to it.
+"""
 
 import json
 import subprocess
@@ -23,7 +27,9 @@ from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
 
 FORMAT, VERSION = "hapteq-proof", 1
+"""Name and version of the format of `proof.json`."""
 DOCUMENT, TABLE, PAGE = "proof.json", "proof.csv", "report.html"
+"""Names of the files in the folder of the test."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,26 +44,39 @@ class CaseRow:
     axes: str
     model: str
     concealed: str
+    """Names of the concealed effects. This and the other texts with several entries: separated by blanks."""
     at: str
+    """Axis of each concealed effect; "all" for an effect on all axes."""
     strength: str
+    """Strength of each concealed effect, 0 to 1."""
     adds: float
+    """Rms change of the readings by the concealed effects, over the rms noise, in the worst channel."""
     detectable: bool
     verdict: str
     named: str
+    """Names of the effects that the diagnosis names."""
     named_at: str
+    """Axis of each named effect; "all" for an effect on all axes."""
     probability: str
+    """Probability of each named effect, as the diagnosis states it."""
     returned: str
+    """The named effects and the rivals that the recordings do not distinguish from these."""
     main_error: float | None
+    """Relative error of the effect's main parameter; only where the right effect of a single one is named."""
     retuned: float | None
+    """Rms error on held-out samples over the rms noise, in the worst channel, with the model re-tuned."""
     after: float | None
+    """The same with the named effects."""
     seconds: float | None
+    """Duration of the diagnosis, s."""
     miss: bool
+    """Whether the case counts as a miss in the score."""
 
 
 @dataclass(frozen=True, slots=True)
 class FigureRow:
-    """A figure as a row of the table to keep: value, interval from `low` to `high`, and the number of items it was
-    measured on."""
+    """A figure as a row of the small table: value, 95 % confidence interval from `low` to `high`, and the number `of`
+    cases or values from which the figure was computed."""
 
     figure: str
     value: float | None
@@ -67,7 +86,7 @@ class FigureRow:
 
 
 def write_proof(done: BlindTest) -> None:
-    """Write document, table and page, replacing earlier ones. Raises StudyError."""
+    """Write document, table, pictures and page into the test's folder, replacing earlier files. Raises StudyError."""
     folder, at = done.folder.path, read_answering_commit(done)
     score = done.score
     document = {
@@ -98,8 +117,8 @@ def write_proof(done: BlindTest) -> None:
 
 
 def write_table(path: Path, done: BlindTest) -> None:
-    """Write the figures and what they were measured on as a small table that can be kept beside the code. Raises
-    StudyError."""
+    """Write the figures to `path` and the misses to `misses_table(path)`. Comment lines at the head of the first table
+    state the cases, the code and the seal of the labels. Raises StudyError."""
     calibration = done.score.calibration
     figures = [
         FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in done.score.figures
@@ -122,12 +141,13 @@ def write_table(path: Path, done: BlindTest) -> None:
 
 
 def misses_table(path: Path) -> Path:
-    """Path of the table of misses, beside the table of figures."""
+    """Path of the table of misses, in the folder of the table of figures."""
     return path.with_name(f"{path.stem}-misses{path.suffix}")
 
 
 def read_answering_commit(done: BlindTest) -> str:
-    """The commit recorded when the answers were first written; the current one where the same code gave them."""
+    """The commit in an earlier `proof.json` by the same code; else the current commit, where the current code gave the
+    answers; else "unknown: …"."""
     document = done.folder.path / DOCUMENT
     if document.exists():
         before = read_json(document, FORMAT, VERSION)
@@ -142,7 +162,8 @@ def seeds(done: BlindTest) -> str:
 
 
 def commit() -> str:
-    """Commit of the running checkout, "+" if its files are changed; "unknown" outside a checkout."""
+    """Commit of the running checkout, with "+" appended if files of its analysis or equalizer are changed; "unknown"
+    where git gives none."""
     root = Path(analysis.diagnosis.__path__[0]).parent
     try:
         at = _git(root, "rev-parse", "HEAD")
@@ -152,11 +173,13 @@ def commit() -> str:
 
 
 def _git(folder: Path, *words: str) -> str:
+    """Output of a git command. Raises OSError, CalledProcessError; TimeoutExpired after 60 s."""
     done = subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=60)
     return done.stdout.strip()
 
 
 def _row(outcome: Outcome, miss: bool) -> CaseRow:
+    """The row of a case. miss: whether the case counts as a miss."""
     known = outcome.kind == "single" and outcome.right and bool(outcome.concealed)
     return CaseRow(
         outcome.number, outcome.seed, outcome.kind, outcome.bank, " ".join(outcome.axes), outcome.model,
@@ -174,4 +197,5 @@ def _row(outcome: Outcome, miss: bool) -> CaseRow:
 
 
 def _short(value: float | None) -> float | None:
+    """The value with four decimals; None for NaN."""
     return None if value is None or value != value else round(value, 4)

@@ -1,8 +1,9 @@
-"""The nominal model: what a laboratory would know of the device, calibrated earlier or re-tuned to the recording.
+"""The nominal models of the challenge: what a laboratory would know of a device whose missing effect is concealed.
 
-Calibrated: mass, damping and stiffness of the bare bench at each driven axis with normally distributed errors of one
-tight tolerance. Re-tuned: these nine numbers fitted to the response of the true device at 1.5 N, so that they absorb as
-much of the concealed effect as they can; the tolerances are wide. Off-diagonals and modes are known exactly in both.
+Calibrated model: mass, damping and stiffness of the bench without the effect, at each of three driven axes, with
+independent normal errors whose standard deviation is the stated, tight tolerance. Re-tuned model: these nine parameters
+are fitted to the response of the true device at 1.5 N, so that they absorb as much of the concealed effect as they can;
+the stated tolerances are wide. Off-diagonal elements and modes are exact in both.
 """
 
 from dataclasses import replace
@@ -18,19 +19,21 @@ from study.evaluation.challenge.sensor import BANDWIDTH_HZ, NOISE_MPS2, RANGE_MP
 from study.evaluation.challenge.sensor_kernel import one_pole
 
 MODES_TOLERANCE = 0.005
-"""Tolerance of the modes of every model of the challenge, relative."""
+"""Relative tolerance (standard deviation) of the modes, stated by every model of the challenge."""
 WIDE = Tolerance(0.05, 3.0, 100.0, MODES_TOLERANCE)
 """Tolerance of a re-tuned model: mass (kg), damping (N s/m), stiffness (N/m), modes."""
 ROUNDS, SLOPES_ANEW = 6, 2
-"""Gauss-Newton steps of the re-tuning, and in how many of the first the slopes are computed anew."""
+"""Most Gauss-Newton steps of the re-tuning, and the number of first steps in which the Jacobian is recomputed."""
 DECIMALS = 8
-"""Significant digits of the matrices in the file."""
+"""Significant digits of the matrices in the model file."""
 
 
 def draw_calibration(
     bench: Bench, random: np.random.Generator, axes: tuple[int, ...] = (0, 1, 2)
 ) -> tuple[Bench, Tolerance]:
-    """The bench with calibration errors, and the tolerance. axes: those with unknown parameters."""
+    """The bench with calibration errors, and the tolerance that the model states. The tolerances are drawn evenly: 1.3
+    to 2.2 % of the mean mass, 3.5 to 9 % of the mean damping, 3.3 to 7.5 % of the mean stiffness. axes: those whose
+    parameters have errors."""
     tolerance = Tolerance(
         mass_kg=float(np.diag(bench.mass).mean() * random.uniform(0.013, 0.022)),
         damping_n_s_per_m=float(np.diag(bench.damping).mean() * random.uniform(0.035, 0.09)),
@@ -45,13 +48,15 @@ def draw_calibration(
 def retune(
     bench: Bench, response: FloatArray, plan: DrivePlan, axes: tuple[int, ...] = (0, 1, 2)
 ) -> tuple[Bench, Tolerance]:
-    """The bench whose mass, damping and stiffness at these axes best fit the response (samples, 3) to the multisines
-    at 1.5 N (Gauss-Newton), and its tolerance."""
+    """The bench whose mass, damping and stiffness at these axes best fit the response to the multisines at 1.5 N, and
+    the tolerance `WIDE`. response: (samples, 3), m/s^2; its residuals are divided by the sensor noise. Gauss-Newton
+    with forward differences, at most `ROUNDS` steps, until every change is below a twentieth of its difference step."""
     parts = [s for s in plan.segments if s.role == "fit" and s.amplitude == LEVELS_N[1]]
     commands = [plan.command[s.start : s.stop] for s in parts]
     seen, free = list(axes), _axes_mask(axes)
     noise = np.array(NOISE_MPS2)[seen]
     wanted = np.vstack([response[s.start : s.stop, seen] for s in parts]) / noise
+    # Difference steps: kg, N s/m, N/m, for three axes each.
     steps = np.repeat((1e-3, 1e-2, 1.0), 3)
     shift = np.zeros(9)
 
@@ -73,7 +78,8 @@ def retune(
 
 
 def shift_diagonals(bench: Bench, by: FloatArray) -> Bench:
-    """The bench with numbers added at the handle. by: (9,): kg, N s/m and N/m, for x, y, z each."""
+    """The bench with the diagonals of mass, damping and stiffness at the handle changed. by: (9,): changes in kg, N s/m
+    and N/m, for x, y, z each."""
     mass, damping, stiffness = (np.diag(part) for part in np.asarray(by).reshape(3, 3))
     return replace(
         bench, mass=bench.mass + mass, damping=bench.damping + damping, stiffness=bench.stiffness + stiffness
@@ -81,7 +87,8 @@ def shift_diagonals(bench: Bench, by: FloatArray) -> Bench:
 
 
 def as_model(name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...] = (0, 1, 2)) -> MechanicalModel:
-    """The model as it is written to the file: 8 significant digits."""
+    """The mechanical model as it is written to the file, with `DECIMALS` significant digits: driven and measured at
+    these axes, with the limits of the sensor and the tolerance."""
     mass, damping, stiffness = (_round_significant(matrix) for matrix in bench.matrices())
     seen = np.eye(len(AXES), len(mass))[list(axes)]
     return MechanicalModel(
@@ -97,13 +104,15 @@ def _axes_mask(axes: tuple[int, ...]) -> FloatArray:
 
 
 def _linear_response(bench: Bench, command: FloatArray) -> FloatArray:
+    """(samples, 3): acceleration of the bench, m/s^2, behind the sensor's first-order low pass. command: (samples, 3),
+    N."""
     acceleration, _ = motion(Device(bench), command)
     smoothed: FloatArray = one_pole(acceleration, 1.0 - np.exp(-2 * np.pi * BANDWIDTH_HZ / RATE_HZ))
     return smoothed
 
 
 def _limit_shift(shift: FloatArray, bench: Bench) -> FloatArray:
-    """Limit the shift: at least half of the mass and a tenth of damping and stiffness remain."""
+    """The shift (9,), limited so that at least half of the mass and a tenth of damping and stiffness remain."""
     lowest = np.concatenate(
         [-0.5 * np.diag(bench.mass), -0.9 * np.diag(bench.damping), -0.9 * np.diag(bench.stiffness)]
     )
@@ -112,5 +121,6 @@ def _limit_shift(shift: FloatArray, bench: Bench) -> FloatArray:
 
 
 def _round_significant(matrix: FloatArray) -> FloatArray:
+    """The matrix rounded to `DECIMALS` significant digits."""
     texts = [[f"{value:.{DECIMALS}g}" for value in row] for row in matrix]
     return np.array(texts, dtype=np.float64)

@@ -1,4 +1,8 @@
-"""Recordings behind the figures: made once and reused by the next run."""
+"""Recordings for the reproduced figures: made once and reused by the next run.
+
+An existing recording is reused only where protocol, seed and place of the handle agree with the request. One that
+differs is never overwritten (StudyError); an interrupted one is removed and made again.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,27 +23,33 @@ from study.workflows.recording.record_device import RecordingPlan, record_device
 
 @dataclass(frozen=True, slots=True)
 class RecordingRequest:
-    """A recording to make. name: of the file, without its ending."""
+    """A recording that is needed."""
 
     name: str
+    """Name of the file, without its ending."""
     protocol: str
+    """Name of a shipped recording protocol, or a file."""
     place_m: Place = CENTRE
+    """Position of the handle, x, y, z (m)."""
     device: str = SIMULATED
+    """Name of the device that is recorded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CachedRecording:
-    """A recording of the reproduction and its file, loaded or just made."""
+    """A recording of the reproduction, loaded or just made."""
 
     path: Path
     recording: Recording
     warnings: tuple[str, ...]
+    """Sentences about segments with a reduced amplitude."""
 
 
 def record_or_load(
     plan: ReproductionPlan, wanted: RecordingRequest, on_share: Callable[[float], None]
 ) -> CachedRecording:
-    """Load the cached recording, or make it. Raises StudyError where the folder holds a recording of another run."""
+    """Load the cached recording, or make it. on_share: called with the completed share, 0 to 1. Raises StudyError where
+    the folder contains a recording of another run under this name."""
     path = plan.recordings / f"{wanted.name}.h5"
     protocol = read_recording_protocol(wanted.protocol).protocol
     found = _load_cached_recording(path, plan, wanted, protocol)
@@ -55,7 +65,8 @@ def record_or_load(
 def _load_cached_recording(
     path: Path, plan: ReproductionPlan, wanted: RecordingRequest, protocol: RecordingProtocol
 ) -> Recording | None:
-    """The cached recording; None where there is none or only an unfinished one, which is removed."""
+    """The cached recording; None where there is none, or only an interrupted one, which is removed. Raises StudyError
+    for a file that cannot be read or belongs to another run."""
     if not path.exists():
         return None
     try:
@@ -77,7 +88,7 @@ def _load_cached_recording(
 
 
 def _warn_of_reduced_amplitudes(recording: Recording) -> tuple[str, ...]:
-    """Warnings where the amplitude was lower than the protocol asks for; repeated on every run."""
+    """Sentences about segments whose amplitude (N) was lower than the protocol requests; repeated on every run."""
     return tuple(
         f"Played at {about['played_amplitude_n']:.3g} N instead of {about['requested_amplitude_n']:.3g} N along "
         f"{about['along']}, because something was at its limit."
@@ -87,6 +98,7 @@ def _warn_of_reduced_amplitudes(recording: Recording) -> tuple[str, ...]:
 
 
 def _foreign(path: Path, why: str) -> StudyError:
+    """The error for a file that does not belong to this reproduction. why: a clause."""
     return StudyError(
         "This folder holds another reproduction",
         f"{path} is in the way: {why}.",

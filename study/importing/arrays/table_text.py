@@ -1,9 +1,9 @@
-"""The text of a table: its encoding, as stated or detected from the bytes.
+"""Reads the text of a table in its character encoding, which is stated by the import map or detected from the bytes.
 
-UTF-8 and UTF-16 can be recognised by their structure. Other encodings assign a meaning to every byte sequence:
-Windows-1252 is taken where bytes beyond ASCII stand alone or within words, as in `µs`, `°` and `Größe`; else the
-encoding in which the text contains a known word for a quantity. If several do, or none, the candidates are named in the
-error.
+UTF-8 and UTF-16 are recognised by their structure. Legacy encodings accept nearly every byte sequence, so the content
+decides: Windows-1252 where non-ASCII characters occur singly or in pairs within words, as in `µs`, `°` and `Größe`;
+else the only encoding in which the text contains a known word for a quantity. If that is none or several, the error
+names the candidates.
 """
 
 import codecs
@@ -16,15 +16,15 @@ from study.regular_file import TABLE_BYTES, read_regular
 from study.store.disk.file_errors import CannotReadError
 
 _LOOKED_AT = 4096
-"""Bytes searched for UTF-16 without a byte order mark: every other byte of a table is then zero."""
+"""Bytes searched for UTF-16 without a byte order mark, in which nearly every other byte of a table is zero."""
 _READ_FOR_WORDS = 65536
-"""Bytes from which an encoding is detected."""
+"""Bytes at the beginning of a file from which a legacy encoding is detected."""
 _ENCODINGS = ("gb18030", "shift_jis", "euc_jp", "euc_kr", "big5", "cp1251", "koi8_r", "cp1250", "cp1253")
 """Encodings that are tried where a text is neither UTF-8 nor Western European."""
 _BEYOND_ASCII = re.compile(r"[^\x00-\x7f]+")
-"""A run of characters beyond ASCII."""
+"""A run of non-ASCII characters."""
 _SHOWN = 24
-"""Characters beyond ASCII that a message shows."""
+"""Maximum number of characters in the sample of text that an error shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +33,12 @@ class TableText:
 
     text: str
     note: str
-    """A sentence where the encoding was detected from words; else empty."""
+    """A sentence for the user where the encoding was detected from words; else empty."""
 
 
 def read_text(path: Path, encoding: str) -> TableText:
-    """Read the text. encoding: as stated by the map; empty to detect it. Raises CannotReadError; ValueError with the
-    key that states it."""
+    """Read the text of a table. encoding: as stated by the map; empty to detect it. Raises CannotReadError, and
+    ValueError where the encoding is wrong, unknown or ambiguous (then with the key of the map that states it)."""
     try:
         data = read_regular(path, TABLE_BYTES)
     except OSError as problem:
@@ -60,6 +60,7 @@ def read_text(path: Path, encoding: str) -> TableText:
 
 
 def _decode(data: bytes, encoding: str) -> str:
+    """Decode strictly. Raises ValueError for an unknown encoding or bytes that are invalid in it."""
     try:
         return data.decode(encoding)
     except LookupError as problem:
@@ -71,7 +72,8 @@ def _decode(data: bytes, encoding: str) -> str:
 
 
 def _decode_other_encoding(data: bytes) -> TableText:
-    """Detection from the lines beyond ASCII that are not remarks."""
+    """Detect a legacy encoding from the non-ASCII lines that are not comments (# or %), and decode. Raises ValueError
+    where no encoding, or more than one, fits."""
     begin = data if len(data) <= _READ_FOR_WORDS else data[: data.rfind(b"\n", 0, _READ_FOR_WORDS) + 1]
     lines = [line for line in begin.splitlines() if not line.isascii() and not line.lstrip().startswith((b"#", b"%"))]
     beyond = b"\n".join(lines)
@@ -95,6 +97,7 @@ def _decode_other_encoding(data: bytes) -> TableText:
 
 
 def _is_western(data: bytes) -> bool:
+    """Whether the text is plausible as Windows-1252: single non-ASCII characters, or two letters within a word."""
     text = data.decode("cp1252", errors="replace")
     for found in _BEYOND_ASCII.finditer(text):
         beside = text[found.start() - 1 : found.start()] + text[found.end() : found.end() + 1]
@@ -113,4 +116,5 @@ def _readable(data: bytes, encoding: str) -> str:
 
 
 def _beyond_ascii(text: str) -> str:
+    """Sample of the text for an error: its non-ASCII characters."""
     return " ".join(_BEYOND_ASCII.findall(text))[:_SHOWN]

@@ -1,4 +1,8 @@
-"""Assign the given files to parts of the recording, or to loggers."""
+"""Assigns the files of an import to the parts of the recording, or to the clocks (loggers) that wrote them.
+
+A recording may be split over files in two ways: one after the other in time (parts), or in parallel, a file for each
+logger with its own clock. The import map states file-name patterns for either way.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +15,7 @@ from study.importing.map_format.map_errors import ImportProblemError
 
 @dataclass(frozen=True, slots=True)
 class PartFiles:
-    """Files of a part of the recording: a path for each clock of the map."""
+    """A part of the recording and its files: a path for each clock of the map, by the clock's name."""
 
     part: PartMap
     by_clock: Mapping[str, Path]
@@ -23,12 +27,14 @@ class PartFiles:
 
     @property
     def label(self) -> str:
-        """Name of the first clock's file, and the prefix of the part's arrays where it has one; for messages."""
+        """Label of the part in messages: name of the first clock's file, and the prefix of the part's arrays, if
+        any."""
         return self.file.name + (f" {self.part.prefix}*" if self.part.prefix else "")
 
 
 def part_files(wanted: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...]:
-    """Parts in the order of the recording. Raises ImportProblemError for a superfluous or missing file."""
+    """Parts in the order of the recording, with their files. Raises ImportProblemError for a superfluous or missing
+    file, and for several files where the map makes a recording of each."""
     ordered = _order_files(wanted, files)
     if wanted.separate and len(ordered) > 1:
         names = ", ".join(path.name for path in ordered)
@@ -42,7 +48,8 @@ def part_files(wanted: ImportMap, files: Sequence[Path]) -> tuple[PartFiles, ...
 
 
 def _order_files(wanted: ImportMap, files: Sequence[Path]) -> list[Path]:
-    """Files sorted by the map's patterns, then as given."""
+    """Files in the order of the map's patterns; those of one pattern in the given order. Raises ImportProblemError for
+    a file that fits no pattern."""
     found = []
     for path in files:
         fits = [number for number, pattern in enumerate(wanted.files) if fnmatchcase(path.name, pattern)]
@@ -53,6 +60,7 @@ def _order_files(wanted: ImportMap, files: Sequence[Path]) -> list[Path]:
 
 
 def _side_by_side(wanted: ImportMap, files: Sequence[Path]) -> PartFiles:
+    """A single part with a file for each clock, recorded in parallel."""
     by_clock = {}
     for clock in wanted.clock:
         (path,) = _exactly_one(clock.file or "*", files, f"clock '{clock.name}'")
@@ -61,6 +69,7 @@ def _side_by_side(wanted: ImportMap, files: Sequence[Path]) -> PartFiles:
 
 
 def _in_sequence(wanted: ImportMap, files: Sequence[Path]) -> Iterator[PartFiles]:
+    """A part for each file, in the order of the map's parts; all clocks are in the same file."""
     for part in wanted.part or (PartMap(),):
         fitting = [path for path in files if fnmatchcase(path.name, part.file)]
         if not fitting:
@@ -70,6 +79,7 @@ def _in_sequence(wanted: ImportMap, files: Sequence[Path]) -> Iterator[PartFiles
 
 
 def _exactly_one(pattern: str, files: Sequence[Path], what: str) -> list[Path]:
+    """List with the single file that fits a pattern. Raises ImportProblemError where none or several fit."""
     fitting = [path for path in files if fnmatchcase(path.name, pattern)]
     if len(fitting) != 1:
         raise ImportProblemError(f"{what} is in the file '{pattern}', which fits {len(fitting)} of {_names(files)}")

@@ -1,4 +1,8 @@
-"""A session as the fold of its events: `begin_session` in `state` takes the first, `apply` each of the others."""
+"""A session's state as the fold of its logged events: `state.begin_session` takes the first event, `apply` each other.
+
+Event sourcing: the state holds only what follows from the log, so that a session can be resumed after a crash. An event
+that cannot follow the previous ones raises LogContradiction. Events within a trial are in `fold_trial`.
+"""
 
 import math
 from dataclasses import replace
@@ -45,7 +49,7 @@ from study.session.state.state import SessionState, take_place
 
 
 def apply(state: SessionState, event: Event) -> SessionState:
-    """The state after one more event. Raises LogContradiction where it cannot follow."""
+    """The state after one more event. Raises LogContradiction where the event cannot follow the state."""
     if state.closed and not isinstance(event, NoteTaken | SessionInterrupted):
         raise LogContradiction(f"{event.event} after the session was closed")
     if state.turned_away_for_good and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
@@ -70,6 +74,7 @@ def _advance_time(sitting: SittingState, event: Event) -> SittingState:
 
 
 def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
+    """Apply an event that is not part of a trial. Raises LogContradiction for a second opening."""
     match event:
         case RestTaken():
             return _apply_rest(state, event)
@@ -93,6 +98,7 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
 
 
 def _apply_rest(state: SessionState, event: RestTaken) -> SessionState:
+    """Apply a rest: none is due any more. Raises LogContradiction where none was due."""
     if state.rest_due_s <= 0:
         raise LogContradiction(f"a rest before trial {event.trial} of run {event.run}, where none was due")
     rested = _with_probing(state, after_break(state.sitting.probing, event, state.protocol.probes))
@@ -104,7 +110,8 @@ def _with_probing(state: SessionState, probing: ProbeState) -> SessionState:
 
 
 def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> SessionState:
-    """Probes are not played within a trial: the hand must feel the trial's stimulus only."""
+    """Apply the beginning or the measurement of a probe, with its vibration dose. Raises LogContradiction within a
+    trial, in which the hand must feel the trial's stimulus only."""
     if state.presented is not None:
         raise LogContradiction(f"{event.event} while a trial is open")
     probing = state.sitting.probing
@@ -114,18 +121,22 @@ def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> Ses
     after = _with_probing(state, end_probe(probing, event))
     if probing.open is None or probing.open.kind != "hand":
         return after
+    # The dose takes an amplitude: that of a sine with the measured root mean square.
     amplitude_mps2 = None if event.rms_mps2 is None else math.sqrt(2) * event.rms_mps2
     sitting = add_exposure(after.sitting, LARGEST_WEIGHT_HZ, amplitude_mps2, event.vibrated_s)
     return replace(after, sitting=sitting)
 
 
 def _take_place(state: SessionState, event: PlaceTaken) -> SessionState:
+    """Apply the participant's place in the balanced order. Raises LogContradiction where none was due."""
     if state.trials or state.sitting.placed or not place_comes_later(state.opened):
         raise LogContradiction("a place in the order was taken where none was due")
     return take_place(state, event.participant_number)
 
 
 def _apply_close(state: SessionState, event: SessionClosed) -> SessionState:
+    """Close the session: completed, or because the person does not take part. Raises LogContradiction where the state
+    does not allow this outcome."""
     if event.outcome != "completed":
         if not state.turned_away_for_good or event.outcome != state.sitting.turned_away:
             raise LogContradiction(f"the session was closed as {event.outcome}, which no form says")
@@ -138,7 +149,7 @@ def _apply_close(state: SessionState, event: SessionClosed) -> SessionState:
 def _apply_preparation(
     state: SessionState, event: FormFilled | DeviceChecked | DemoPlayed | DemoFinished
 ) -> SessionState:
-    """Apply a form, device check or demonstration."""
+    """Apply a form, device check or demonstration. Raises LogContradiction while a trial is open."""
     if state.presented is not None:
         raise LogContradiction(f"{event.event} while a trial is open")
     match event:

@@ -1,4 +1,9 @@
-"""The fold of a trial's events: presented, answered, measured or void; and what they do to staircase, run and dose."""
+"""The fold of a trial's events (presented, answered, measured or void) into the state of a session.
+
+A trial is open from its presentation until it is measured or void. A measured trial moves the staircase and the place
+in the run; a void one is due again with the next attempt number. Each adds its vibration to the dose. An event that
+does not fit the state raises LogContradiction.
+"""
 
 import math
 from dataclasses import replace
@@ -27,7 +32,8 @@ from study.session.state.state import SessionState, current_rule, due, felt, rep
 
 
 def present_trial(state: SessionState, event: TrialPresented) -> SessionState:
-    """The state with this trial open. Raises LogContradiction where it differs from the draw that is due."""
+    """The state with this trial open. Raises LogContradiction where another trial is open, no run is left, or the
+    trial differs from the draw that is due."""
     if state.presented is not None:
         raise LogContradiction(f"{place_of(event)} presented while another trial is open")
     if state.finished:
@@ -41,7 +47,7 @@ def present_trial(state: SessionState, event: TrialPresented) -> SessionState:
 def _trial_row(
     opened: SessionOpened, event: TrialPresented, felt: bool | None, repeat_cause: VoidCause | None
 ) -> Trial:
-    """Presentation part of a row of `trials.csv`; answer and measurement follow later."""
+    """Row of `trials.csv` at the presentation; answer and measurement are added later."""
     return Trial(
         subject=opened.subject,
         session=opened.session,
@@ -71,7 +77,8 @@ def _trial_row(
 
 
 def answer_trial(state: SessionState, event: AnswerGiven) -> SessionState:
-    """The open trial with its answer; the staircase follows once it is measured. Raises LogContradiction."""
+    """The open trial with its answer; the staircase moves when the trial is measured. Raises LogContradiction where
+    the trial is not open or has an answer."""
     presented = _open_trial(state, event)
     if state.answered is not None:
         raise LogContradiction(f"{place_of(event)} answered twice")
@@ -86,7 +93,7 @@ def answer_trial(state: SessionState, event: AnswerGiven) -> SessionState:
 
 
 def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
-    """The open trial closed: staircase, dose, and the next trial, rest or run. Raises LogContradiction."""
+    """Close the answered trial: staircase, dose, and the next trial, rest or run. Raises LogContradiction."""
     presented = _open_trial(state, event)
     if state.answered is None:
         raise LogContradiction(f"{place_of(event)} measured before it was answered")
@@ -103,6 +110,7 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
         latest_s=event.latest_s,
         status=TrialStatus(event.status),
     )
+    # Amplitude of the vector along and across the stimulus.
     amplitude_mps2 = None
     if event.delivered_mps2 is not None:
         amplitude_mps2 = math.hypot(event.delivered_mps2, event.off_axis_mps2 or 0.0)
@@ -119,7 +127,8 @@ def measure_trial(state: SessionState, event: TrialMeasured) -> SessionState:
 
 
 def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
-    """The open trial void: the same stimulus is due again. Raises LogContradiction."""
+    """Close the open trial as void, so that it is due again. Raises LogContradiction where it is not open, or where the
+    participant asked for a repeat and none is left in this run."""
     presented = _open_trial(state, event)
     if event.cause is VoidCause.ASKED and repeats_left(state) == 0:
         raise LogContradiction(f"{place_of(event)} was asked for again, where no repeat of this run was left")
@@ -143,6 +152,7 @@ def spoil_trial(state: SessionState, event: TrialSpoiled) -> SessionState:
 
 
 def _with_sensor(row: Trial, sensor: SensorFacts | None) -> Trial:
+    """The row with what the accelerometer lost during the trial; unchanged without a sensor."""
     if sensor is None:
         return row
     missing, garbled_bytes = sensor.missing, sensor.spoiled_bytes
@@ -150,6 +160,7 @@ def _with_sensor(row: Trial, sensor: SensorFacts | None) -> Trial:
 
 
 def _open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialSpoiled) -> TrialPresented:
+    """The presentation to which the event belongs. Raises LogContradiction where that trial is not open."""
     presented = state.presented
     if presented is None or (presented.run, presented.trial, presented.attempt) != (
         event.run,
@@ -161,7 +172,7 @@ def _open_trial(state: SessionState, event: AnswerGiven | TrialMeasured | TrialS
 
 
 def _step(state: SessionState, presented: TrialPresented, correct: bool) -> SessionState:
-    """Effect of an answer: on the staircase, on a practice run's count, or none in a catch trial."""
+    """Apply an answer: to the count of a practice run, else to the staircase; no effect in a catch trial."""
     if state.runs[state.run].practice:
         return replace(state, practice=add_answer(state.practice, correct))
     if presented.phase is Phase.CATCH:
@@ -170,12 +181,14 @@ def _step(state: SessionState, presented: TrialPresented, correct: bool) -> Sess
 
 
 def _run_over(state: SessionState) -> bool:
+    """Whether the current run is finished, by the rule of practice or of the staircase."""
     if state.runs[state.run].practice:
         return practice_over(state.protocol.practice, state.practice)
     return is_finished(current_rule(state), state.staircase)
 
 
 def _next_run(state: SessionState) -> SessionState:
+    """The state at the beginning of the next run, with the rest that is due before it (s); no rest after the last."""
     last = state.run + 1 == len(state.runs)
     # Practice runs are short: their rest is the time it takes to read how they went.
     rest_s = 0.0 if last or state.runs[state.run].practice else state.protocol.rests.after_run_s
@@ -184,6 +197,7 @@ def _next_run(state: SessionState) -> SessionState:
 
 
 def _rest_within_run(protocol: StudyProtocol, trials_done: int) -> float:
+    """Rest (s) that is due after so many trials of a run, 0 for none."""
     every = protocol.rests.after_trials
     return protocol.rests.within_run_s if every and trials_done % every == 0 else 0.0
 
@@ -191,7 +205,8 @@ def _rest_within_run(protocol: StudyProtocol, trials_done: int) -> float:
 def _add_vibration(
     state: SessionState, presented: TrialPresented, amplitude_mps2: float | None, seconds: float | None
 ) -> SessionState:
-    """Add the vibration of a presentation to the dose, whether or not the trial counts."""
+    """Add the vibration of a presentation to the dose, whether or not the trial counts. amplitude_mps2: None where it
+    was not measured, and is estimated; seconds: duration of the vibration."""
     if amplitude_mps2 is None:
         amplitude_mps2 = likely_amplitude_mps2(state.trials, presented.frequency_hz, presented.level_n)
     sitting = add_exposure(state.sitting, presented.frequency_hz, amplitude_mps2, seconds)

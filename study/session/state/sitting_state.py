@@ -1,4 +1,8 @@
-"""State around the trials: forms, checks, demonstration, and today's vibration dose. Part of the fold."""
+"""State of a sitting around its trials: forms, device check, demonstration, and the vibration dose of the day.
+
+Part of the session's state that `fold` computes from the log. The dose is the daily exposure A(8) of `vibration_dose`;
+a rest of `NIGHT_H` without movement of the handle starts a new day.
+"""
 
 from __future__ import annotations
 
@@ -17,21 +21,22 @@ class Night:
     """A rest after which the dose started again from zero."""
 
     still_s: float
-    """Time without movement of the handle, by the clock."""
+    """Duration of the rest without movement of the handle (s), by the clock."""
     dose: Dose
-    """The dose that was reset."""
+    """The session's dose before the rest, which the rest reset."""
 
 
 @dataclass(frozen=True, slots=True)
 class SittingState:
-    """Consent, inclusion, questions, demonstration, debrief hold for the session; set-up and check for one sitting."""
+    """State around the trials. Consent, inclusion, questions, demonstration and debriefing hold for the whole session;
+    set-up and device check for one sitting."""
 
     consented: bool = False
     included: bool = False
     turned_away: Literal["", "refused", "excluded"] = ""
-    """Why nothing may be played: see TURNED_AWAY; empty if allowed."""
+    """Reason why no stimulus may be played: consent refused, or excluded by a question; empty if allowed."""
     placed: bool = False
-    """The place in the balanced order is taken."""
+    """Whether the participant's place in the balanced order of conditions is taken."""
     questioned: bool = False
     setup_done: bool = False
     device_checked: bool = False
@@ -40,7 +45,7 @@ class SittingState:
     """Demonstrations played in the session."""
     debriefed: bool = False
     last: Moment = Moment("")  # noqa: RUF009 - frozen
-    """Time of the last log entry, up to which everything here counts."""
+    """Time of the last log entry; all durations below are those at this time."""
     sat_s: float | None = None
     """Seconds since the handle first moved in this sitting; None before."""
     busy_voids: int = 0
@@ -50,28 +55,28 @@ class SittingState:
     still_s: float | None = None
     """Seconds since the handle last moved, in any sitting; None before."""
     dose: Dose = NO_DOSE
-    """Dose since the last long rest: see NIGHT_H."""
+    """Dose of this session since the last rest of `NIGHT_H` or more."""
     elsewhere: Dose = NO_DOSE
-    """Dose of the participant's other sessions since then, as known at the beginning of this sitting."""
+    """Dose of the participant's other sessions on the same day, as known at the beginning of this sitting."""
     not_counted: tuple[str, ...] = ()
-    """Sessions of the participant that could not be read then."""
+    """Sessions of the participant that could not be read at the beginning of this sitting."""
     night: Night | None = None
-    """The last long rest."""
+    """The last rest of `NIGHT_H` or more; None before the first."""
     clock_steps: tuple[ClockStep, ...] = ()
-    """Steps of the computer's wall clock."""
+    """Steps of the computer's wall clock that the log shows."""
     probing: ProbeState = ProbeState()  # noqa: RUF009 - frozen
 
 
 NIGHT_H = 10.0
-"""A rest of this length (h) without movement starts a new day for the hand. A calendar date would be worse: midnight
-may fall into a sitting. Within a sitting the monotonic clock counts, between sittings the wall clock: setting it
-forward by this much there passes for a night, unless it is set back later."""
+"""Rest (h) without movement after which a new day begins for the hand, and the dose is 0 again. A calendar date is not
+used, because midnight may fall into a sitting. Time is taken from the monotonic clock within a sitting and from the
+wall clock between sittings: setting the wall clock forward between sittings counts as rest, until it is set back."""
 NIGHT_S = 3600 * NIGHT_H
 """`NIGHT_H` in seconds."""
 
 
 def fill_in(sitting: SittingState, event: FormFilled) -> SittingState:
-    """The state after a form."""
+    """The state after a form; `event.passed` decides on consent and on inclusion."""
     match event.form:
         case "consent":
             return replace(sitting, consented=event.passed, turned_away="" if event.passed else "refused")
@@ -96,8 +101,8 @@ def finish_demo(sitting: SittingState, event: DemoFinished) -> SittingState:
 
 
 def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
-    """The state at the beginning of another sitting. Under the first rules, which ask once, a person who was turned
-    away is asked again, in case of a mistyped answer."""
+    """The state at the beginning of a further sitting. answers: number of answers so far. Under version 1 of the rules
+    (`rules`) a person who was turned away is asked again, in case an answer was mistyped."""
     return replace(
         sitting,
         setup_done=False,
@@ -111,8 +116,8 @@ def sit_down_again(sitting: SittingState, answers: int) -> SittingState:
 
 
 def pass_time(sitting: SittingState, now: Moment, resumed: bool = False) -> SittingState:
-    """Advance to this moment. resumed: it begins a new sitting, so that its monotonic clock is not comparable with
-    earlier ones."""
+    """Advance all durations to this moment. resumed: the moment begins a new sitting, whose monotonic clock cannot be
+    compared with earlier values."""
     last = Moment(sitting.last.utc) if resumed else sitting.last
     passed, step = elapsed_s(last, now), clock_step(last, now, between_sittings=resumed)
     since_s = sitting.probing.since_s
@@ -127,11 +132,12 @@ def pass_time(sitting: SittingState, now: Moment, resumed: bool = False) -> Sitt
 
 
 def _apply_clock_step(sitting: SittingState, step: ClockStep) -> SittingState:
-    """A clock set back may reveal that a rest between two sittings was shorter than it seemed, because the clock had
-    been set forward: the rest is shortened, and a dose that it reset is restored."""
+    """Correct the rests for a step of the wall clock. A clock that is set back may show that it had been set forward
+    between two sittings, so that the rest was shorter than counted: the rest is shortened, and a dose that it reset is
+    restored."""
     steps = (*sitting.clock_steps, step)
     known = replace(sitting, clock_steps=steps)
-    # Known steps forward were never counted as rest: setting the clock back by as much changes nothing.
+    # Known steps forward were not counted as rest: setting the clock back by the same amount changes nothing.
     doubt_s = max(0.0, -_sum_s(steps)) - max(0.0, -_sum_s(sitting.clock_steps))
     if doubt_s <= 0:
         return known
@@ -146,18 +152,19 @@ def _apply_clock_step(sitting: SittingState, step: ClockStep) -> SittingState:
 
 
 def _sum_s(steps: tuple[ClockStep, ...]) -> float:
+    """Total of the steps (s), positive: forward."""
     return sum(step.by_s for step in steps)
 
 
 def start_motion(sitting: SittingState) -> SittingState:
-    """The handle moves now: after a night's rest the dose starts again."""
+    """The state when the handle begins to move: after a rest of `NIGHT_H` or more the dose starts again from zero."""
     if sitting.still_s is not None and sitting.still_s >= NIGHT_S:
         sitting = replace(sitting, night=Night(sitting.still_s, sitting.dose), dose=NO_DOSE, elsewhere=NO_DOSE)
     return replace(sitting, sat_s=sitting.sat_s or 0.0, still_s=0.0)
 
 
 def dose_now(sitting: SittingState) -> Dose:
-    """Dose of today: none after a night's rest."""
+    """Dose of today, of this and the participant's other sessions; none after a rest of `NIGHT_H` or more."""
     rested = sitting.still_s is not None and sitting.still_s >= NIGHT_S
     return NO_DOSE if rested else total(sitting.dose, sitting.elsewhere)
 
@@ -165,15 +172,16 @@ def dose_now(sitting: SittingState) -> Dose:
 def add_exposure(
     sitting: SittingState, frequency_hz: float, amplitude_mps2: float | None, seconds: float | None
 ) -> SittingState:
-    """Add vibration to the dose. seconds: None where an older log did not count them; nothing is then added."""
+    """Add vibration of this frequency and amplitude (None = not known) to the dose. seconds: duration; None in older
+    logs, which did not record it, and nothing is added."""
     if not seconds:
         return sitting
     return replace(sitting, dose=add(sitting.dose, frequency_hz, amplitude_mps2, seconds))
 
 
 def likely_amplitude_mps2(trials: tuple[Trial, ...], frequency_hz: float, level_n: float) -> float | None:
-    """Estimated acceleration (m/s^2) of a stimulus without a measurement: level times the largest ratio measured at
-    this frequency."""
+    """Estimated acceleration amplitude (m/s^2) of a stimulus that was not measured: its level (N) times the largest
+    ratio of amplitude to level measured at this frequency; None without such a measurement."""
     ratios = [
         trial.delivered_mps2 / trial.level_n
         for trial in trials

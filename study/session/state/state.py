@@ -1,6 +1,7 @@
-"""State of a session at one moment, folded from events by `study.session.state.fold`.
+"""State of a session: an immutable value, computed from the logged events by `study.session.state.fold`.
 
-The state is a value and holds nothing that is not in the log: the same log gives the same state, after a crash, too.
+The state depends on the log alone, so that the same log always gives the same state (event sourcing). A session that
+was interrupted by a crash is resumed from its log in this way.
 """
 
 from dataclasses import dataclass, field, replace
@@ -23,27 +24,31 @@ from study.session.state.sitting_state import SittingState
 
 @dataclass(frozen=True, slots=True)
 class SessionState:
-    """Everything decided so far in one sitting."""
+    """Position in the schedule, open trial, finished trials, and facts of the current sitting."""
 
     opened: SessionOpened
+    """The opening line of the log: participant, device, seed."""
     protocol: StudyProtocol
     runs: tuple[Run, ...]
+    """Schedule of the participant, in order."""
     run: int
     """Index of the current run; len(runs) when all are finished."""
     staircase: StaircaseState
+    """Staircase of the current run."""
     trial: int
     """Number of the current trial in its run, from 0."""
     attempt: int
-    """Number of the current presentation of that trial, from 0; above 0 where earlier ones were void."""
+    """Number of the current presentation of that trial, from 0; above 0 where earlier presentations were void."""
     presented: TrialPresented | None
-    """The open trial, if any."""
+    """The trial that is presented and not completed, if any."""
     answered: AnswerGiven | None
     """The answer of the open trial, whose measurement is not logged yet."""
     trials: tuple[Trial, ...]
-    """All presentations so far, void ones and an open last one among them."""
+    """All presentations so far, including void presentations, and the open trial as the last."""
     rest_due_s: float
     """Rest before the next trial (s)."""
     closed: bool
+    """Whether the log says that the session is closed."""
     practice: PracticeState = field(default_factory=PracticeState)
     """Answers of the current run, if it is a practice run; its staircase is then unused."""
     sitting: SittingState = field(default_factory=SittingState)
@@ -60,7 +65,7 @@ class SessionState:
 
     @property
     def takes_part(self) -> bool:
-        """Whether the participant number of `opened` is a place in the balanced order."""
+        """Whether the participant number in `opened` is the participant's final place in the counterbalanced order."""
         return self.sitting.placed or bool(self.trials) or not place_comes_later(self.opened)
 
     @property
@@ -70,7 +75,8 @@ class SessionState:
 
 
 def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionState:
-    """The state after the opening line. Raises LogContradiction where it does not match its protocol."""
+    """The state after the opening line of the log. Raises LogContradiction where that line and the protocol
+    disagree."""
     _check_scales(opened, protocol)
     state = SessionState(
         opened=opened,
@@ -91,7 +97,7 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
 
 
 def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
-    """Raise LogContradiction unless every frequency has its scale of levels."""
+    """Raise LogContradiction unless an equalized session has a scale of levels for every frequency."""
     if opened.equalized is None:
         return
     known = {scale.frequency_hz for scale in opened.equalized.levels}
@@ -101,8 +107,8 @@ def _check_scales(opened: SessionOpened, protocol: StudyProtocol) -> None:
 
 
 def take_place(state: SessionState, participant_number: int) -> SessionState:
-    """Assign the place in the balanced order before the first trial: this number, not that of the opening line, now
-    gives the order of the runs."""
+    """Assign the place in the counterbalanced order, before the first trial. participant_number replaces the number of
+    the opening line and determines the order of the runs."""
     opened = replace(state.opened, participant_number=participant_number)
     order = runs(state.protocol, opened.seed, participant_number)
     after = replace(state, opened=opened, runs=order, sitting=replace(state.sitting, placed=True))
@@ -115,13 +121,13 @@ def current_rule(state: SessionState) -> StaircaseRule:
 
 
 def due(state: SessionState) -> Present:
-    """The next presentation: what the current run's staircase and schedule ask for."""
+    """The next presentation, determined by the staircase and the schedule of the current run."""
     place = Place(state.runs[state.run], state.trial, state.attempt, state.staircase)
     return due_trial(state.protocol, state.opened, current_rule(state), place)
 
 
 def repeats_left(state: SessionState) -> int | None:
-    """How many more repeats the participant may ask for in this run; None if unlimited."""
+    """Number of further repeats of a stimulus that the participant may request in this run; None if unlimited."""
     if not same_stimulus_again(state.opened):
         return None
     asked = sum(trial.run == state.run and trial.void_cause is VoidCause.ASKED for trial in state.trials)
@@ -129,5 +135,5 @@ def repeats_left(state: SessionState) -> int | None:
 
 
 def felt(opened: SessionOpened) -> bool | None:
-    """Whether a person felt the stimuli; None for a simulated participant."""
+    """Whether a person felt the stimuli: False on a simulated device, None for a simulated participant."""
     return None if opened.observer is not None else not opened.device.simulated

@@ -1,17 +1,22 @@
-"""Views of past sessions for lists and viewers: values only, light to import."""
+"""Data classes that the start screen and the viewers of past sessions and diagnoses show.
+
+They hold plain values and import no analysis, so that a screen opens quickly. `study.workflows.views` fills them from
+the files.
+"""
 
 from dataclasses import dataclass
 from typing import Literal
 
 Standing = Literal["finished", "unfinished", "running", "refused", "excluded", "withdrawn", "unreadable"]
-"""How far a past session is. `running`: a program writes its log now; `refused`, `excluded`: the participant did not
-take part; `withdrawn`: only a tombstone is left."""
+"""Status of a session. `running`: a program is writing its log; `refused`, `excluded`: the participant did not take
+part, see `TURNED_AWAY`; `withdrawn`: the data were erased, and only a note of the withdrawal is kept; `unreadable`: the
+log is missing or damaged."""
 
 TURNED_AWAY = {
     "refused": "consent was not given",
     "excluded": "a question of the exclusion list was answered with yes",
 }
-"""Outcomes of people who do not take part, in words."""
+"""Why a participant did not take part, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,14 +28,17 @@ class SessionLine:
     subject: str
     protocol: str
     begun_utc: str
+    """Time of the opening, UTC; of the last change where the session cannot be read."""
     observer: str | None
     """Name of the simulated participant; None for a person."""
     answers: int
+    """Number of answers in the log."""
     runs_done: int
     runs: int
+    """Number of runs in the plan."""
     standing: Standing
     remark: str = ""
-    """Such as the reason why the session cannot be read."""
+    """Note for the list, such as the reason why the session cannot be read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +74,7 @@ class HomeView:
 
 @dataclass(frozen=True, slots=True)
 class Staircase:
-    """One run as a drawing needs it; its tuples have one entry per trial that counts."""
+    """One run, as a plot needs it. Its tuples have one entry per trial that counts; levels are forces in N."""
 
     title: str
     levels_n: tuple[float, ...]
@@ -76,6 +84,7 @@ class Staircase:
     threshold_n: float | None
     """None where the run is not complete."""
     cap_n: float
+    """Highest level that the protocol allows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,10 +121,10 @@ class DiagnosisView:
     fit: tuple[tuple[str, ...], ...]
     """Errors before, re-tuned and with the effects."""
     remainder: tuple[tuple[str, ...], ...]
-    """What is left above the noise."""
+    """Errors that the effects leave above the noise."""
     next_experiment: str
     report: str = ""
-    """Path of the report.html beside it; empty where there is none."""
+    """Path of the report.html in the same folder; empty where there is none."""
     notes: tuple[str, ...] = ()
     """Remarks, such as how errors were measured and what was re-tuned."""
     candidates: tuple[str, ...] = ()

@@ -1,6 +1,8 @@
-"""Forms that a person fills in beside the trials: consent, exclusion, the set-up, questions. Values only.
+"""Forms that are filled in during a session in addition to the trials: consent, exclusion criteria, questionnaires,
+set-up, state of the handle. Plain values without any drawing, for every kind of screen.
 
-What is shown is in the participant's language; what is kept is not: see `coded`.
+Texts are shown in the participant's language; answers are logged as codes that are the same in every language, so that
+studies in several languages can be analysed together (`coded`).
 """
 
 import re
@@ -12,18 +14,23 @@ class FormKind(Enum):
     """Kinds of forms, each shown at its own point of a sitting."""
 
     CONSENT = "consent"
+    """Informed consent."""
     EXCLUSION = "exclusion"
+    """Questions on the exclusion criteria."""
     QUESTIONNAIRE = "questionnaire"
-    """Before the trials; the debrief comes after them."""
+    """Questions to the participant before the trials."""
     SETUP = "setup"
+    """Facts on the experimental set-up."""
     DEBRIEF = "debrief"
+    """Questions to the participant after the trials."""
     HANDLE = "handle"
-    """Whether it is free, or held again: asked around a reference, and logged with it."""
+    """Whether the handle is free, or held again: shown before and after a reference measurement; logged with
+    that measurement, not as a form."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of a number."""
+    """Least and largest valid value of a number, both included, in the unit that the question states."""
 
     lowest: float
     highest: float
@@ -31,26 +38,26 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class FormField:
-    """A question of a form: a choice, a number (with `limits`), or free text."""
+    """A question of a form: a choice (with `choices`), a number (with `limits`), or free text."""
 
     key: str
-    """Names the answer in the log."""
+    """Name of the answer in the log."""
     label: str
-    """What is asked, a whole sentence."""
+    """The question, a whole sentence."""
     choices: tuple[str, ...] = ()
-    """Exactly one of them; empty for free text."""
+    """Valid answers, of which exactly one is given; empty for a number or free text."""
     needed: bool = True
-    """Whether an answer is required; what is not required may stay empty."""
+    """Whether an answer is required; otherwise it may be empty."""
     codes: tuple[str, ...] = ()
-    """What is kept for each of the choices; empty: the choices themselves."""
+    """Code that is logged for each of the choices; empty: the choices themselves are logged."""
     limits: Limits | None = None
-    """Where a number is asked for."""
+    """Limits of the number; None for a choice or free text."""
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A form as it is shown, in the participant's language. version, ethics_id: as stated by the protocol, for the
-    log."""
+    """A form as it is shown, in the participant's language. version, ethics_id: version of the form and number of the
+    ethics approval as the protocol states them, for the log."""
 
     kind: FormKind
     title: str
@@ -62,19 +69,20 @@ class Form:
 
 @dataclass(frozen=True, slots=True)
 class FormReply:
-    """Answers to a form as they were given, in the language shown; `coded` converts them to what is kept."""
+    """Answers to a form as they were given, in the language shown; `coded` converts them for the log."""
 
     answers: dict[str, str]
     """Answers by the keys of their fields."""
 
 
 def find_missing_fields(form: Form, reply: FormReply) -> tuple[FormField, ...]:
-    """Fields without a valid answer."""
+    """Fields of the form without a valid answer in the reply."""
     return tuple(field for field in form.fields if not has_answer(field, reply.answers.get(field.key, "").strip()))
 
 
 def has_answer(field: FormField, answer: str) -> bool:
-    """Whether this answer, as it is shown, will do; none will do where none is needed."""
+    """Whether an answer, as shown, is valid: one of the choices, a number within the limits, or any text; an empty one
+    is valid only where no answer is required."""
     if not answer:
         return not field.needed
     if field.choices:
@@ -86,13 +94,14 @@ def has_answer(field: FormField, answer: str) -> bool:
 
 
 def number_in(answer: str) -> float | None:
-    """Parse a decimal number, with point or comma; None for other text."""
+    """Parse a decimal number with point or comma, at most 15 digits on either side; None for other text."""
     plain = answer.replace(",", ".")
     return float(plain) if re.fullmatch(r"[+-]?([0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15})", plain) else None
 
 
 def coded(form: Form, reply: FormReply) -> dict[str, str]:
-    """The answers as they are kept, the same in every language: choices by their codes, numbers with a point."""
+    """The answers as they are logged, the same in every language: choices as their codes, numbers with a decimal point,
+    missing answers as empty text."""
     kept = {}
     for field in form.fields:
         answer = reply.answers.get(field.key, "").strip()

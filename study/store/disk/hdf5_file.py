@@ -1,7 +1,8 @@
-"""Our HDF5 files: opened with their format checked, written atomically.
+"""Reads and writes HDF5 files: format, version and contents are checked when opened; files are written atomically.
 
-A sealed file begins with a block of text that HDF5 leaves to its user, with the check sum of all that follows: the HDF5
-library may hang on a damaged file, so the sum is checked before the library sees it.
+A sealed file begins with a user block (bytes that the HDF5 library ignores) of text: the SHA-256 checksum and the size
+of all bytes after it. The checksum is verified before the HDF5 library opens the file, because the library may hang on
+a damaged file.
 """
 
 import hashlib
@@ -24,23 +25,24 @@ from study.store.disk.hdf5_contents import check_contents
 Value = TypeVar("Value")
 
 SEAL = b"hapteq sha256 "
-"""First bytes of a sealed file; digest and size follow as text."""
+"""First bytes of a sealed file; the digest in hexadecimal and the size in bytes follow as text."""
 SEAL_BYTES = 512
-"""The smallest block that HDF5 leaves to its user."""
+"""Length of the user block: the smallest that HDF5 allows."""
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""First bytes of HDF5: at the start of a file without such a block."""
+"""Signature of HDF5: the first bytes of a file without a user block."""
 BROKEN_SEAL = (
     "its content does not fit the check sum at its beginning: it was damaged, cut off, or changed by another program "
     "since it was written"
 )
-"""Problem of a file whose content differs from its seal."""
+"""Message for a file whose content does not agree with its seal."""
 
 
 class Problems:
-    """Collects all problems of a file, so that they can be corrected together."""
+    """Collects all problems of a file, so that they can be reported and corrected together."""
 
     def __init__(self) -> None:
         self.found: list[str] = []
+        """Messages, in the order of reading."""
 
     def attempt(self, read: Callable[[], Value], otherwise: Value) -> Value:
         """The result of `read`; a ValueError is recorded as a problem and gives `otherwise`."""
@@ -57,7 +59,7 @@ def is_hdf5(path: Path) -> bool:
 
 
 def format_of(path: Path) -> str:
-    """The format attribute of an HDF5 file; empty if there is none. Raises UnusableFileError."""
+    """The format attribute of an HDF5 file; empty if there is none. Raises CannotReadError, UnusableFileError."""
     with open_any_hdf5(path, "HDF5 file") as file:
         try:
             return text_attribute(file, "format", "")
@@ -67,8 +69,9 @@ def format_of(path: Path) -> str:
 
 @contextmanager
 def open_hdf5(path: Path, kind: str, format_name: str, version: int, *, sealed: bool = False) -> Iterator[Any]:
-    """The open file after its format and version are checked. sealed: as `write_hdf5` writes this format; one that
-    another program wrote may have no such block at all. Raises CannotReadError, UnusableFileError."""
+    """The open file after its format and version are checked. kind: name of such files in messages. sealed: files of
+    this format are written with a seal, though a file of another program may have no user block. Raises
+    CannotReadError, UnusableFileError."""
     with open_any_hdf5(path, kind, sealed=sealed) as file:
         try:
             found = text_attribute(file, "format")
@@ -84,8 +87,8 @@ def open_hdf5(path: Path, kind: str, format_name: str, version: int, *, sealed: 
 
 
 def float_dataset(file: Any, name: str, shape: str) -> FloatArray:
-    """Read a dataset of numbers. shape: in words, as in "(samples, channels)". Raises ValueError with a sentence
-    fragment."""
+    """Read a dataset of floating-point numbers. shape: in words, as in "(samples, channels)"; the number of dimensions
+    is checked. Raises ValueError with a sentence fragment."""
     dataset = file.get(name)
     if not isinstance(dataset, h5py.Dataset):
         raise ValueError(f"the dataset '{name}' is missing")
@@ -97,8 +100,8 @@ def float_dataset(file: Any, name: str, shape: str) -> FloatArray:
 
 
 def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool, sealed: bool = False) -> None:
-    """`fill` gets an open file in memory, which is then written atomically: HDF5 on a full disk would leave a
-    damaged file."""
+    """Write a file atomically. `fill` writes into a file in memory first, because the HDF5 library would leave a
+    damaged file on a full disk. Raises AlreadyThereError, CannotWriteError."""
     buffer = io.BytesIO()
     with h5py.File(buffer, "w", userblock_size=SEAL_BYTES if sealed else 0) as file:
         fill(file)
@@ -107,22 +110,25 @@ def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool, seal
 
 
 def with_seal(content: bytes) -> bytes:
-    """The bytes of an HDF5 file with its checksum (SHA-256 of what follows) written into its user block."""
+    """The bytes of an HDF5 file with a user block of `SEAL_BYTES`, with the seal (SHA-256 of all bytes after the block)
+    written into the block."""
     body = content[SEAL_BYTES:]
     return _seal(hashlib.sha256(body).hexdigest(), len(body)) + body
 
 
 def _seal(digest: str, size: int) -> bytes:
+    """The user block of a sealed file: digest and size as text, filled with zeros to `SEAL_BYTES`."""
     return (SEAL + f"{digest} {size} bytes follow\n".encode("ascii")).ljust(SEAL_BYTES, b"\0")
 
 
 def _check_seal(path: Path, kind: str, sealed: bool) -> None:
-    """Raises UnusableFileError where a file is not as it was sealed, and OSError."""
+    """Raises UnusableFileError where the content differs from the seal, or where a format that is written with a seal
+    has a user block without one; OSError where the file cannot be read."""
     with open_regular(path) as file:
         start = file.read(SEAL_BYTES)
         if start.startswith(SEAL):
             broken = _seal(hashlib.file_digest(file, "sha256").hexdigest(), file.tell() - SEAL_BYTES) != start
-        else:  # what is HDF5 from a later place on had a seal
+        else:  # HDF5 that begins later in the file has a user block: its seal is damaged
             broken = sealed and not start.startswith(SIGNATURE) and is_hdf5(path)
     if broken:
         raise UnusableFileError(path, kind, (BROKEN_SEAL,))
@@ -143,7 +149,7 @@ def open_any_hdf5(path: Path, kind: str, *, sealed: bool = False) -> Iterator[An
                 raise UnusableFileError(path, kind, (str(problem),)) from problem
             yield file
     except DAMAGED as problem:
-        # h5py raises all of these for damaged files; our own problems are already UnusableFileErrors.
+        # h5py raises all of these for damaged files; problems found above are already UnusableFileErrors.
         raise UnusableFileError(
             path, kind, (f"it is not HDF5 that can be read, or it is cut off ({problem})",)
         ) from problem

@@ -1,4 +1,8 @@
-"""UTF-8 text files with actionable errors, and the text of TOML files, limited so that parsing takes ordinary time."""
+"""Read and write UTF-8 text files; errors are StudyErrors that tell a person what to do.
+
+TOML files are limited in size and in the depth of their keys before they are parsed: the parser's time grows with the
+square of the number of parts of a dotted key, so that a small hostile file could block the program.
+"""
 
 import re
 from pathlib import Path
@@ -9,7 +13,8 @@ from study.store.disk.file_errors import CannotReadError, UnusableFileError
 
 
 def read_text(path: Path, most_bytes: int = TABLE_BYTES) -> str:
-    """The text without a byte order mark. Raises CannotReadError, also for a larger file."""
+    """The text of a file, without a byte order mark. Raises CannotReadError where the file cannot be read, is not
+    UTF-8, or is larger than `most_bytes`."""
     try:
         return read_regular(path, most_bytes).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as problem:
@@ -17,17 +22,19 @@ def read_text(path: Path, most_bytes: int = TABLE_BYTES) -> str:
 
 
 def write_text(path: Path, text: str, *, overwrite: bool = False) -> None:
-    """Write atomically. Line ends are written unchanged, so that a file is the same on every system. Surrogates
-    (from a file name that is not UTF-8) become question marks."""
+    """Write atomically. Line ends are written unchanged, so that a file is the same on every system. Surrogates (from a
+    file name that is not UTF-8) become question marks. Raises AlreadyThereError for an existing file unless
+    `overwrite`, and CannotWriteError."""
     write_atomically(path, text.encode("utf-8", errors="replace"), overwrite=overwrite)
 
 
 TOML_BYTES = 2**22
-"""Largest TOML file; a mechanical model of 100 coordinates is a twentieth of it."""
+"""Largest TOML file that is read, in bytes; a mechanical model of 100 coordinates is a twentieth of that size."""
 DEEPEST_KEY = 32
-"""Most parts of a dotted key."""
+"""Largest number of parts of a dotted key."""
 _PART = r"(?:[\w-]++|\"(?:[^\"\\\n]|\\.)*+\"?|'[^'\n]*+'?)"
-"""A part of a dotted key: bare, or in quotes, closed or not."""
+"""Regular expression of a part of a dotted key: bare, or in quotes, which may lack their end. `++` and `*+` are
+possessive, so that the search never backtracks."""
 _PIECE = re.compile(
     r"#[^\n]*+"
     r'|"""(?:[^\\"]|\\.|"(?!""))*+(?:""")?'
@@ -35,13 +42,13 @@ _PIECE = re.compile(
     rf"|(?P<key>{_PART}(?:[ \t]*+\.[ \t]*+{_PART})*+)",
     re.DOTALL,
 )
-"""Comments and multi-line texts, which are skipped, and possible keys. Each match begins where the previous one
-ended, so that the search is linear."""
+"""Regular expression of comments and multi-line strings, which are skipped, and of possible keys. Matches do not
+overlap, so that the time of the search is linear in the length of the file."""
 
 
 def read_toml_text(path: Path, kind: str) -> str:
-    """The text of a TOML file whose parsing takes ordinary time. kind: what it should be, for messages. Raises
-    CannotReadError, UnusableFileError."""
+    """The text of a TOML file, checked but not parsed. kind: what the file should be, for messages. Raises
+    CannotReadError, and UnusableFileError for a key of too many parts."""
     text = read_text(path, TOML_BYTES)
     if problem := too_long_key(text):
         raise UnusableFileError(path, kind, (problem,))
@@ -49,8 +56,7 @@ def read_toml_text(path: Path, kind: str) -> str:
 
 
 def too_long_key(text: str) -> str:
-    """Problem with a dotted key of too many parts, for which the parser takes quadratic time; empty if there is
-    none."""
+    """A phrase that names the line of the first dotted key with more than `DEEPEST_KEY` parts; "" if there is none."""
     for piece in _PIECE.finditer(text):
         key = piece["key"]
         if key and len(key) > 2 * DEEPEST_KEY and len(re.findall(_PART, key)) > DEEPEST_KEY:

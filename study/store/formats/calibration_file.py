@@ -1,4 +1,8 @@
-"""Calibrations of a linkage as HDF5: the format `hapteq-calibration`, version 1."""
+"""Calibrations of a linkage as HDF5: the format `hapteq-calibration`, version 1.
+
+A calibration is the device's own kinematics and dynamics over a grid of handle positions: joint angles, Jacobian,
+inertia and gravity force, in SI units. `LAYOUT` lists the contents with shapes and units.
+"""
 
 import json
 from pathlib import Path
@@ -16,7 +20,7 @@ from study.store.disk.strict_json import load_json
 
 FORMAT, VERSION = "hapteq-calibration", 1
 KIND = "calibration of a linkage"
-"""What messages call such a file."""
+"""Name of such a file in messages."""
 
 ABOUT = (
     "What a device says of its linkage over a grid of positions (`hapteq calibrate`); arrays have checksums. The file "
@@ -24,7 +28,7 @@ ABOUT = (
     "follows. By them a damaged file is refused before the HDF5 library sees it, which may hang on such a file. Files "
     "of other programs may be without."
 )
-"""Introduction in docs/formats.md."""
+"""Introduction of the format in docs/formats.md, which is generated."""
 
 LAYOUT = (
     Entry("format", "attribute, text", f"`{FORMAT}`"),
@@ -52,7 +56,7 @@ DIMENSIONS = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3)"
 
 
 def read_calibration(path: Path) -> LinkageCalibration:
-    """Read a calibration of a linkage. Raises CannotReadError, or UnusableFileError with all problems."""
+    """Read a calibration of a linkage. Raises CannotReadError, or UnusableFileError with all problems of the file."""
     problems = Problems()
     with open_hdf5(path, KIND, FORMAT, VERSION, sealed=True) as file:
         parts = _parts(file, problems)
@@ -65,7 +69,8 @@ def read_calibration(path: Path) -> LinkageCalibration:
 
 
 def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
-    """Write a calibration of a linkage. Raises AlreadyThereError, CannotWriteError."""
+    """Write a calibration of a linkage, sealed and never over an existing file. Raises AlreadyThereError,
+    CannotWriteError."""
 
     def fill(file: Any) -> None:
         file.attrs.update({"format": FORMAT, "version": VERSION, "difference": calibration.difference})
@@ -79,6 +84,9 @@ def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
 
 
 def _parts(file: Any, problems: Problems) -> dict[str, Any]:
+    """Fields of `LinkageCalibration`; where a part is missing or wrong, the problem is recorded and a placeholder
+    returned."""
+
     def array(name: str) -> FloatArray:
         shape = DIMENSIONS.get(name, "(positions, 3)")
         return problems.attempt(lambda: float_dataset(file, name, shape), np.empty(0))
@@ -100,6 +108,7 @@ def _parts(file: Any, problems: Problems) -> dict[str, Any]:
 
 
 def _provenance(file: Any) -> dict[str, Any]:
+    """The attribute `provenance`, empty if missing. Raises ValueError where it is not a JSON object."""
     found = load_json(text_attribute(file, "provenance", "{}"))
     if not isinstance(found, dict):
         raise ValueError("the attribute 'provenance' must be a JSON object")

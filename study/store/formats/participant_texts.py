@@ -1,5 +1,8 @@
-"""Tables of participants' texts: one TOML file a language, with a text for every key. Shipped ones by code, a
-laboratory's own by path."""
+"""Tables of the texts that participants read: one TOML file per language, with a text for every key of `ENGLISH`.
+
+A protocol selects a shipped language by its code ("de"), or a laboratory's own table by the path of a file. The texts
+are copied into the protocol, so that its hash and every log contain them.
+"""
 
 import json
 import tomllib
@@ -16,12 +19,13 @@ from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_toml_text
 
 KIND = "table of texts"
-"""What messages call such a file."""
+"""Name of such a file in messages."""
 
 
 def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[str, str]]:
-    """The language's name, and its texts by key. language: a code such as "de", or a file, from `folder`. Raises
-    WrongUseError (no such language), CannotReadError, UnusableFileError with every key that is missing or wrong."""
+    """The language's name, and its texts by key. language: a code such as "de", or the path of a TOML file, relative
+    to `folder`. Raises WrongUseError (no such language), CannotReadError, and UnusableFileError with all keys that are
+    missing or wrong."""
     if language == "en":
         return language, dict(ENGLISH)
     if language in LANGUAGES:
@@ -45,15 +49,16 @@ def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[
 
 
 def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Protocol, str]:
-    """A protocol with all its participants' texts in it, and the text of a file that says the same.
+    """A protocol with all its participants' texts, and the TOML text of this protocol: `text` itself where no texts had
+    to be filled in.
 
-    The latter is `text` itself where nothing had to be filled in. folder: of the protocol, None for a shipped one.
-    Raises ProtocolError, and what `read_language` raises.
+    text: of the protocol file; source: its name for messages; folder: of the file, None for a shipped protocol. Raises
+    ProtocolError, CannotReadError, UnusableFileError.
     """
     try:
         values = tomllib.loads(text)
     except (ValueError, RecursionError):
-        return load_protocol(text, source), text  # which says what is wrong
+        return load_protocol(text, source), text  # It raises ProtocolError with the cause.
     language, words = language_of(values), own_words(values)
     if wrong := table_problems(words, whole=False):
         raise ProtocolError(source, tuple(problem.below("text.words") for problem in wrong))
@@ -69,7 +74,8 @@ def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Proto
 
 
 def language_template(language: str) -> str:
-    """A table as TOML text, each key below its English text where the language is another."""
+    """A table as TOML text, to be translated. Above each text that differs from the English text, a comment holds the
+    latter. Raises as `read_language`."""
     name, table = read_language(language)
     lines = [f"# Participants' texts of hapteq, {LANGUAGES.get(name, name)}. What stands in braces is filled in."]
     for key, english in ENGLISH.items():

@@ -20,6 +20,7 @@ from study.store.formats.psych_ds import ExportedTrials, trials_in
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
 TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME = "trials.csv", "dictionary.csv", "protocol.toml", "facts.json"
+"""Names of the files of every export."""
 ANSWERS_NAME = "answers.csv"
 """Answers to questionnaires; written only where the protocol asks questions."""
 KIND = "table of exported trials"

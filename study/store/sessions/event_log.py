@@ -1,4 +1,8 @@
-"""The log of a session: append one line, fsync, and only then act. Never rewritten."""
+"""The log of a session: an append-only file with one JSON event per line, each with a checksum (`log_chain`).
+
+A program appends the line and syncs it to the disk (fsync) before it acts on the event, so that the log never lacks
+what happened. Lines are never rewritten; only an incomplete last line, which a crash leaves, is removed.
+"""
 
 import contextlib
 import json
@@ -15,22 +19,24 @@ from study.store.disk.atomic_write import sync_folder
 from study.store.disk.privacy import PRIVATE_FILE
 
 LOG_NAME = "events.jsonl"
+"""Name of the log in the session's folder."""
 NO_LINES = Chain()
 """The hash chain before the first line."""
 
 
 class EventLog:
-    """An open log. One writer: hold the session's lock while it is open."""
+    """A log that is open for appending. It may have a single writer, who holds the session's lock meanwhile."""
 
     def __init__(self, path: Path, descriptor: int, chain: Chain | None = NO_LINES) -> None:
-        """chain: of the existing lines; None reads them before the first line is added."""
+        """descriptor: of the file, open for appending. chain: of the existing lines; None = read before the first
+        line is added."""
         self._path = path
         self._descriptor = descriptor
         self._chain = chain
 
     @classmethod
     def create(cls, path: Path) -> "EventLog":
-        """Raises FileExistsError rather than touch an existing log."""
+        """Create an empty log. Raises FileExistsError for an existing log, OSError, and StudyError if it is locked."""
         descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
         sync_folder(path.parent)
         _lock_file(descriptor, path)
@@ -38,9 +44,10 @@ class EventLog:
 
     @classmethod
     def reopen(cls, path: Path) -> "EventLog":
-        """Open an existing log for appending. Raises StudyError if it cannot be written to."""
+        """Open an existing log for appending. Raises StudyError if it cannot be written to or another program has it
+        open."""
         try:
-            open_regular(path).close()  # a named pipe would block until its other end is opened
+            open_regular(path).close()  # Refuses a named pipe, which would block until its other end is opened.
             descriptor = os.open(path, os.O_WRONLY | os.O_APPEND)
         except OSError as problem:
             raise StudyError(
@@ -53,7 +60,7 @@ class EventLog:
         return cls(path, descriptor, chain=None)
 
     def append(self, event: Event) -> None:
-        """Append one line; on return it is on the disk. Raises StudyError, leaving the log unchanged, if that fails."""
+        """Append one line; on return it is on the disk. Raises StudyError, leaving the log unchanged, on failure."""
         before = os.fstat(self._descriptor).st_size
         if self._chain is None:
             self._chain = read_log(self._path).chain
@@ -62,7 +69,7 @@ class EventLog:
             _write_all(self._descriptor, line)
             os.fsync(self._descriptor)
         except BaseException as problem:
-            # Also on Ctrl-C: half a line would corrupt the next one.
+            # Also on Ctrl-C: an incomplete line would corrupt the next line.
             with contextlib.suppress(OSError):
                 os.ftruncate(self._descriptor, before)
             if isinstance(problem, OSError):
@@ -77,20 +84,22 @@ class EventLog:
 
 @dataclass(frozen=True, slots=True)
 class LogContents:
-    """Content of a session's log: its events, and an incomplete last line apart from them."""
+    """Content of a session's log: its events, and separately an incomplete last line."""
 
     events: tuple[Event, ...]
     torn: str
     """An incomplete last line, left by a crash; empty if there is none."""
     torn_bytes: int
+    """Length of the incomplete line in bytes."""
     chain: Chain
+    """Hash chain after the last complete line."""
     whole: bytes = field(repr=False)
     """All complete lines, as on the disk."""
 
 
 def read_log(path: Path) -> LogContents:
-    """All complete events. Only the last line may be incomplete; a broken earlier line is an error. Raises
-    StudyError."""
+    """Read a log. Only the last line may be incomplete. Raises StudyError where the file cannot be read, or an earlier
+    line is damaged or unknown."""
     try:
         data = read_regular(path)
     except OSError as problem:
@@ -109,7 +118,7 @@ def read_log(path: Path) -> LogContents:
 
 
 def read_opening(path: Path) -> Event | None:
-    """The first line only; None if it is incomplete. Raises StudyError, OSError."""
+    """The event of the first line alone; None if the file or a complete line is missing. Raises StudyError, OSError."""
     if not path.exists():
         return None
     with open_regular(path) as file:
@@ -118,19 +127,19 @@ def read_opening(path: Path) -> Event | None:
 
 
 def readable_events(path: Path) -> tuple[Event, ...]:
-    """Events before the first damage, to inspect an unusable log. Never raises."""
+    """Events before the first damaged line, to inspect an unusable log; empty where the file cannot be read."""
     chain, events = Chain(), list[Event]()
     try:
         for line in read_regular(path).split(b"\n")[:-1]:
             chain, event = read_chained(chain, line)
             events.append(parse_event(event))
     except (OSError, ValueError):
-        pass  # the damage begins here; the caller reports it
+        pass  # The damage begins here; the caller reports it.
     return tuple(events)
 
 
 def mend(path: Path, contents: LogContents) -> None:
-    """Remove an incomplete last line, so that the next fact starts on its own line."""
+    """Remove an incomplete last line, so that the next event starts on a line of its own. Raises OSError."""
     if not contents.torn_bytes:
         return
     descriptor = os.open(path, os.O_WRONLY)
@@ -142,10 +151,11 @@ def mend(path: Path, contents: LogContents) -> None:
 
 
 def _lock_file(descriptor: int, path: Path) -> None:
-    """A second lock, on the log itself: the lock file might be deleted while its holder still writes."""
+    """Lock the log itself, in addition to the lock file, which might be deleted while its holder still writes. Raises
+    StudyError if another program holds the lock; does nothing where the system has no such locks."""
     try:
         import fcntl
-    except ImportError:  # Windows; the lock file is all there is
+    except ImportError:  # Windows has no flock: the lock file alone protects the log.
         return
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -158,12 +168,13 @@ def _lock_file(descriptor: int, path: Path) -> None:
             saved="Nothing was changed.",
         ) from problem
     except OSError:
-        return  # a network file system without such locks: the lock file has to suffice
+        return  # A network file system without such locks: the lock file has to suffice.
 
 
 @contextlib.contextmanager
 def hold_log_lock(path: Path) -> Iterator[None]:
-    """Hold the lock of a log that is to be erased. Raises StudyError while it is being written."""
+    """Hold the lock of a log that is to be erased; without a log, do nothing. Raises StudyError while a program writes
+    it."""
     if not path.exists():
         yield
         return
@@ -175,7 +186,8 @@ def hold_log_lock(path: Path) -> Iterator[None]:
 
 
 def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
-    """The event of the next line, given without its line end. Raises StudyError."""
+    """The chain after the next line, and its event. chain: of the lines before. line: without its line end. Raises
+    StudyError for a line that is damaged, unknown, or of a newer version."""
     try:
         after, event = read_chained(chain, line)
         return after, parse_event(event)
@@ -191,7 +203,7 @@ def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
         wrong, whole = "is not an event that this version knows", f"The {number - 1} lines before it are whole."
         if isinstance(problem, ChainBrokenError):
             wrong = f"{problem}"
-            if number > 1 and not chain.since:  # earlier lines without checksum are covered by this one
+            if number > 1 and not chain.since:  # This checksum covers earlier lines without a checksum, too.
                 wrong, whole = f"{problem}, or one of the lines before it was changed", "Nothing was changed."
         raise StudyError(
             "The session log is damaged",
@@ -202,6 +214,7 @@ def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
 
 
 def _is_newer(line: bytes) -> bool:
+    """Whether a first line is that of a session in another version of the format."""
     try:
         opening = json.loads(line)
     except (ValueError, RecursionError):
@@ -211,11 +224,13 @@ def _is_newer(line: bytes) -> bool:
 
 
 def _write_all(descriptor: int, data: bytes) -> None:
+    """Write all bytes: `os.write` may write fewer than it was given."""
     while data:
         data = data[os.write(descriptor, data) :]
 
 
 def _not_saved(path: Path, event: Event, problem: OSError) -> StudyError:
+    """The error for an event that could not be written."""
     return StudyError(
         "The session cannot be written to disk",
         f"Writing '{event.event.replace('_', ' ')}' to {path.name} of {path.parent.name} failed: {problem.strerror}.",

@@ -1,7 +1,9 @@
-"""`seal.json` beside the log of a closed session: its length and hash. Written once.
+"""Seal of the log of a closed session: a file `seal.json` with the length and hash of the log, next to it.
 
-A log grows after closing if something is noted later; a further seal (`seal-2.json`, ...) then covers that too. A seal
-holds for the beginning of the log that it was written for.
+The hash chain of the log alone cannot show that lines are missing at the end, or that a log was rewritten with its
+chain; the seal shows both. A seal is never rewritten: a note that is added after closing gets a further seal
+(`seal-2.json`, ...). Each seal covers the log from its beginning to the length at which the seal was written. There is
+no key: a seal does not reveal that log and seal were replaced together.
 """
 
 import hashlib
@@ -22,38 +24,41 @@ from study.store.disk.json_document import read_json, write_json
 from study.store.sessions.event_log import LOG_NAME, LogContents, read_log
 
 SEAL_NAME = "seal.json"
-"""File of the first seal; later ones are seal-2.json, seal-3.json and so on."""
+"""Name of the first seal's file; later seals are seal-2.json, seal-3.json and so on."""
 SEAL_FORMAT, SEAL_VERSION = "hapteq-seal", 1
+"""Name and version of the file format, written into every seal."""
 _NAME = re.compile(r"seal(-(?P<number>\d{1,6}))?\.json", re.ASCII)
-"""Name of any seal."""
+"""Pattern of the file name of any seal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seal:
-    """Length of the log when the seal was written."""
+    """Length and hash of the log when the seal was written."""
 
     session: str
+    """Name of the session's folder."""
     lines: Count
     bytes: Count
     head: Annotated[str, Field(pattern=f"^[0-9a-f]{{{DIGITS}}}$")]
     """Checksum of the last line: the head of the hash chain."""
     sha256: Sha256
-    """SHA-256 of these bytes of `events.jsonl`."""
+    """SHA-256 of the first `bytes` bytes of `events.jsonl`."""
 
 
 SEAL: TypeAdapter[Seal] = TypeAdapter(Seal)
-"""Checks and writes a seal."""
+"""Validator and JSON schema of a seal."""
 
 
 def seal_paths(folder: Path) -> dict[int, Path]:
-    """Seals by number, in the order of writing."""
+    """Files of the seals in a session's folder by number, in the order of writing."""
     found = ((_NAME.fullmatch(path.name), path) for path in folder.glob("seal*.json"))
     return dict(sorted((int(match["number"] or 1), path) for match, path in found if match))
 
 
 def write_seal(folder: Path, contents: LogContents) -> bool:
-    """Write the seal; on return it is on the disk. False if a seal covers the whole log already. contents: of a closed
-    session whose log has checksums. Raises StudyError."""
+    """Write a seal to the disk, unless a seal covers the whole log already: then returns False. contents: log of a
+    closed session, with checksums. Raises StudyError where an existing seal does not match the log, or on a disk
+    error."""
     if check_seals(folder, contents) == contents.chain.lines:
         return False
     seal = Seal(
@@ -65,20 +70,20 @@ def write_seal(folder: Path, contents: LogContents) -> bool:
     )
     number = max(seal_paths(folder), default=0) + 1
     path = folder / (SEAL_NAME if number == 1 else f"seal-{number}.json")
-    with suppress(AlreadyThereError):  # another program was first, with the same
+    with suppress(AlreadyThereError):  # another program has just written the same seal
         write_json(path, SEAL_FORMAT, SEAL_VERSION, asdict(seal))
     return True
 
 
 def seal_log(log: Path) -> None:
-    """Seal right after the last line of a closed session. If that fails, the seal stays due: `hapteq resume` and
-    `hapteq analyze` write it and say so."""
+    """Seal the log of a session that was just closed. Never raises StudyError: if the seal cannot be written now,
+    `hapteq resume` and `hapteq analyze` write it later and report it."""
     with suppress(StudyError):
         write_seal(log.parent, read_log(log))
 
 
 def read_seal(path: Path) -> Seal:
-    """Read a seal. Raises CannotReadError, UnusableFileError."""
+    """Read and validate a seal. Raises CannotReadError, and UnusableFileError for an invalid one."""
     document = read_json(path, SEAL_FORMAT, SEAL_VERSION)
     try:
         return SEAL.validate_json(json.dumps(document), strict=True)
@@ -89,7 +94,8 @@ def read_seal(path: Path) -> Seal:
 
 
 def check_seals(folder: Path, contents: LogContents) -> int:
-    """Number of sealed lines; 0 without a seal. Raises StudyError if one does not hold."""
+    """Number of lines of the log that seals cover; 0 without a seal. Raises StudyError if a seal is unreadable or does
+    not match the log."""
     sealed = 0
     for path in seal_paths(folder).values():
         try:
@@ -111,9 +117,9 @@ def check_seals(folder: Path, contents: LogContents) -> int:
 
 
 def is_sealed(folder: Path, content: bytes) -> bool:
-    """Whether there is a seal, all seals hold, and every line matches its checksum; nothing is parsed.
+    """Whether there is a seal, and every line matches its checksum; events are not parsed. content: of the log.
 
-    Raises StudyError if a seal does not hold.
+    Raises StudyError if a seal is unreadable or does not match the log.
     """
     *lines, tail = content.split(b"\n")
     chain = Chain()
@@ -126,6 +132,7 @@ def is_sealed(folder: Path, content: bytes) -> bool:
 
 
 def _is_sealed_prefix(folder: Path, seal: Seal, prefix: bytes) -> bool:
+    """Whether the beginning of a log is what a seal states: session, hash, number of lines, and last checksum."""
     return (
         seal.session == folder.name
         and seal.sha256 == hashlib.sha256(prefix).hexdigest()
@@ -135,6 +142,8 @@ def _is_sealed_prefix(folder: Path, seal: Seal, prefix: bytes) -> bool:
 
 
 def _contradiction(folder: Path, contents: LogContents, happened: str) -> StudyError:
+    """The error for a seal that does not match its log. happened: continues the sentence "In <folder>, ...". A seal
+    may be deleted only where the log's own checksums still protect it."""
     do_now = f"Restore {LOG_NAME} and the seal from a copy."
     if contents.chain.since:
         do_now += (

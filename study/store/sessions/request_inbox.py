@@ -1,7 +1,8 @@
-"""Requests to a running session: one small file per request, in a folder of the session.
+"""Requests of other programs to a running session: one small file per request, in a folder of the session.
 
-The sender writes a file under a unique name and renames it into place; the session reads and removes it. The name
-begins with the kind of request, so that a stop is recognised even if its content cannot be read.
+The sender writes a file under a temporary name and renames it, so that the session never reads an incomplete request;
+the session reads and removes it. The final name is unique and begins with the kind of request, so that a stop is
+recognised even if its content cannot be read.
 """
 
 import errno
@@ -22,24 +23,25 @@ from study.store.disk.real_folder import is_real_folder
 from study.store.disk.strict_json import load_json
 
 REQUESTS_NAME = "requests"
-"""Folder of the requests, in that of the session."""
+"""Name of the folder of requests, inside the session's folder."""
 REQUEST_FORMAT = "hapteq-request"
 REQUEST_VERSION = 1
+"""Format and version that every request states; others are not read."""
 
 KINDS: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
 """Kinds of requests, by the beginning of the file's name."""
 _STOP = "stop"
 """Beginning of the name of a request to stop: it counts even if its content cannot be read."""
 _NOTE = "note-"
-"""Beginning of the name of a note: it is kept from one sitting to the next."""
+"""Beginning of the name of a note: unread notes are kept from one sitting to the next."""
 _WHO = get_args(Who)
 """Senders that a reader accepts."""
 _LARGEST = 1 << 16
-"""Bytes of a request that are read; a note is a sentence or two."""
+"""Largest number of bytes of a request that are read; a note has only a few sentences."""
 _AT_ONCE = 50
-"""Requests taken in one look: a flood must not block the session's loop."""
+"""Largest number of requests taken in one call: many requests at once must not block the session's loop."""
 _counter = itertools.count()
-"""Keeps the names of this program's requests apart, and in order, within a tick of the clock."""
+"""Makes the names of this program's requests unique, and keeps them in order, within one tick of the clock."""
 
 
 class RequestInbox:
@@ -48,7 +50,7 @@ class RequestInbox:
     def __init__(self, session: Path) -> None:
         self._folder = session / REQUESTS_NAME
         self._passed_over: set[str] = set()
-        """Names that could be neither used nor removed: examined once, not twenty times a second."""
+        """Names of files that could be neither used nor removed: they are examined once, not twenty times a second."""
 
     def send(self, request: Request) -> str:
         """Returns the request's name, for `unread` and `take_back`. Raises StudyError if it cannot be written."""
@@ -59,7 +61,7 @@ class RequestInbox:
         part = self._folder / f".{name}.part"
         try:
             self._make_folder()
-            # No fsync: a request is for now, and is not wanted after a power cut.
+            # No fsync: a request concerns only the running session and need not survive a power failure.
             write_private(part, f"{json.dumps(document)}\n".encode())
             part.replace(self._folder / name)
         except OSError as problem:
@@ -104,12 +106,14 @@ class RequestInbox:
         return tuple(request for name in names[:_AT_ONCE] if (request := self._take_one(name)) is not None)
 
     def _make_folder(self) -> None:
-        """Raises OSError, also for a link, whose target is not the session's."""
+        """Create the folder. Raises OSError, also for a symbolic link, which may lead outside the session."""
         self._folder.mkdir(mode=PRIVATE_FOLDER, exist_ok=True)
         if not is_real_folder(self._folder):
             raise NotADirectoryError(errno.ENOTDIR, "it is a link", str(self._folder))
 
     def _take_one(self, name: str) -> Request | None:
+        """Read and remove a request. An unreadable stop counts as the experimenter's; other unreadable requests are set
+        aside."""
         request = _parse_request(_content(self._folder / name))
         if request is None and name.startswith(_STOP):
             request = StopAsked("experimenter")
@@ -120,13 +124,14 @@ class RequestInbox:
         return request
 
     def _remove(self, name: str) -> None:
+        """Delete a request; where that fails, ignore it from now on."""
         try:
             (self._folder / name).unlink()
         except OSError:
             self._passed_over.add(name)
 
     def _set_aside(self, name: str) -> None:
-        """Rename to a hidden name, for later inspection."""
+        """Rename to a hidden name, for later inspection; where that fails, ignore the file from now on."""
         try:
             (self._folder / name).rename(self._folder / f".unusable-{name}")
         except OSError:
@@ -134,11 +139,12 @@ class RequestInbox:
 
 
 def _stops_then_oldest(name: str) -> tuple[bool, str]:
+    """Sort key: stops first, then by the time in the name."""
     return not name.startswith(_STOP), name.partition("-")[2]
 
 
 def _content(path: Path) -> bytes:
-    """Content; empty if it is not a regular file: opening a pipe would block."""
+    """Content of a regular file; empty for anything else. A link is not followed, and a named pipe does not block."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
     except OSError:
@@ -153,6 +159,7 @@ def _content(path: Path) -> bytes:
 
 
 def _parse_request(content: bytes) -> Request | None:
+    """The request in a file; None where the content is not a valid one."""
     try:
         document = load_json(content)
     except ValueError:
@@ -166,6 +173,7 @@ def _parse_request(content: bytes) -> Request | None:
 
 
 def _fits(kind: type[Request], values: dict[str, Any]) -> bool:
+    """Whether the values are exactly the fields of this kind, each of its type, from a known sender."""
     known = {"who": str, "text": str, "adverse": bool}
     wanted = {field.name for field in fields(kind)}
     return (

@@ -1,4 +1,8 @@
-"""Screens outside sittings: the start, past sessions, diagnoses."""
+"""Screens of the terminal interface outside sittings: start screen, past sessions, diagnoses.
+
+Screens exchange messages with the engine, a separate process that reads files and computes (`study.tui.engine`). They
+are imported when they are first shown, so that the program starts quickly.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class ArchiveScreens:
-    """Shows the start screen, past sessions and diagnoses, and passes their requests to the engine."""
+    """Shows the start screen, past sessions and diagnoses, and sends their requests to the engine."""
 
     def __init__(self, app: App[Any], send: Callable[[ToEngine], None], start: AppStart) -> None:
         self._app = app
@@ -44,7 +48,7 @@ class ArchiveScreens:
         self._diagnosing: DiagnosingScreen | None = None
 
     async def home(self) -> None:
-        """Show the start screen at once, and its list when it is read."""
+        """Show the start screen at once, and request its list, which is shown when the engine has read it."""
         from study.tui.screens.home import HomeScreen
 
         self.clear()
@@ -54,13 +58,13 @@ class ArchiveScreens:
         self._send(ShowHome(self._start.data, self._start.protocol, self._start.device, self._start.model))
 
     def clear(self) -> None:
-        """Remove all screens but the start screen."""
+        """Remove all screens above the start screen."""
         self._session = None
         while len(self._app.screen_stack) > 1 and self._app.screen is not self._home:
             self._app.pop_screen()
 
     async def hear(self, message: FromEngine) -> None:
-        """Show what a message of the engine brings. Only outside sittings."""
+        """Display the content of a message from the engine. Called only outside sittings."""
         match message:
             case Home(view=view) if self._home is not None:
                 self._home.show(view)
@@ -81,7 +85,7 @@ class ArchiveScreens:
                 self._app.notify(sentence, markup=False)
 
     async def diagnose(self, command: Diagnose) -> None:
-        """Start a diagnosis; its screen is removed when it ends."""
+        """Start a diagnosis and show its progress. If the user stops it, the engine is told to stop."""
         from study.tui.screens.diagnosing import DiagnosingScreen
 
         def stopped(stopped_here: bool | None) -> None:
@@ -100,16 +104,18 @@ class ArchiveScreens:
             self._app.pop_screen()
 
     def end_calibrating(self) -> None:
-        """Let the calibration begin again after an error."""
+        """Allow the calibration of the sensor to be started again after an error."""
         if (screen := self._sensor_screen()) is not None:
             screen.begin_again()
 
     def _sensor_screen(self) -> SensorScreen | None:
+        """The sensor screen, if it is open."""
         from study.tui.screens.sensor import SensorScreen
 
         return next((screen for screen in self._app.screen_stack if isinstance(screen, SensorScreen)), None)
 
     async def _show_session(self, view: SessionView) -> None:
+        """Show a session, in its screen if that is open already."""
         from study.tui.screens.confirm_view import confirm_view
         from study.tui.screens.session import SessionScreen
 
@@ -123,7 +129,8 @@ class ArchiveScreens:
         screen = SessionScreen(view)
         self._session, self._session_path = screen, view.line.path
         if view.line.standing == "running" and view.line.observer is None:
-            # Its staircases and its log tell a participant who looks on what was right and wrong.
+            # The staircases and the log of a running session would show a participant which answers were correct, so
+            # that a confirmation is required first.
             confirm_view(self._app, view.line.name, lambda: self._app.push_screen(screen))
             return
         await self._app.push_screen(screen)

@@ -1,4 +1,8 @@
-"""The screens of one sitting: the one that the engine asks for, above the trial's, which stays."""
+"""Shows the screens of one sitting in the terminal, on request of the engine, and sends the replies.
+
+The engine runs the session in another process. Each of its requests (`Ask`) opens a screen above the trial's screen,
+which stays open underneath; the screen's result is sent back with the number of the request.
+"""
 
 from __future__ import annotations
 
@@ -52,12 +56,13 @@ SCREENS: dict[Call, Callable[[Any, Words], Screen[Any]]] = {
     Call.AWAIT_RETURN: AwaitReturnScreen,
     Call.GOODBYE: GoodbyeScreen,
 }
-"""Screen of each request of the engine; those that are missing here take more than what is shown."""
+"""Screen of each request of the engine that needs only the content and the texts. `screen_for` makes those of the other
+requests, except the trial's."""
 
 
 def screen_for(ask: Ask, keys: AnswerKeys, words: Words) -> Screen[Any]:
-    """A screen for every request but the trial, whose screen is kept for the whole sitting. Each is dismissed with
-    the reply."""
+    """A new screen for a request other than a trial, whose screen is kept between requests. The screen is dismissed
+    with the reply as its result."""
     if ask.call is Call.WELCOME:
         return InstructionsScreen(ask.shown, keys, words)
     if ask.call is Call.CHOOSE_DEMO:
@@ -68,14 +73,14 @@ def screen_for(ask: Ask, keys: AnswerKeys, words: Words) -> Screen[Any]:
 
 
 def forget_drawn_before(app: App[Any]) -> None:
-    """Clear caches of Textual 8.2 that keep removed widgets alive. Garbage collection over them blocks the event
-    loop for longer with every trial, finally beyond the half second after which a screen counts as dead. To be
-    called when screens change."""
-    # Textual caches a lookup of two colours with the whole rendering of a widget as key: the last 1024 of them.
+    """Clear caches of Textual 8.2 that keep removed widgets alive; call it when screens change. Otherwise garbage
+    collection of these widgets blocks the event loop for longer with every trial, finally for more than the half second
+    after which a screen counts as dead."""
+    # Textual caches 1024 lookups of two colours, each with the whole rendering of a widget as key.
     StylesCache.get_inner_outer.cache_clear()
     for screen in app.screen_stack:
         for footer in screen.query(Footer):
-            # A recomposed footer keeps watchers of its old keys until what they follow changes.
+            # A recomposed footer keeps watchers of its old keys until the watched attribute changes.
             footer.mutate_reactive(Footer.compact)
 
 
@@ -84,8 +89,8 @@ TROUBLE_FOR_S = 8.0
 
 
 class SittingScreens:
-    """Shows what the engine asks for, and sends the replies. One per sitting. Every reply carries the number of its
-    request, and each is sent once."""
+    """Shows the screens that the engine requests in one sitting, and sends the replies. Every reply carries the number
+    of its request and is sent once."""
 
     def __init__(
         self,
@@ -94,7 +99,7 @@ class SittingScreens:
         keys: AnswerKeys,
         forget_earlier: Callable[[], None],
     ) -> None:
-        """forget_earlier: lets keys that were read before now answer nothing."""
+        """send: sends a message to the engine. forget_earlier: discards keys that were pressed before the call."""
         self.path = ""
         """Folder of the session, once it is opened."""
         self.words = ENGLISH_WORDS
@@ -104,7 +109,7 @@ class SittingScreens:
         self._keys = keys
         self._forget_earlier = forget_earlier
         self._number = 0
-        """Number of the present question; 0 without one."""
+        """Number of the request that waits for a reply; 0 where none does."""
         self._shown: Screen[Any] | None = None
         self._trial: TrialScreen | None = None
         self._preparing: PreparingScreen | None = None
@@ -133,11 +138,12 @@ class SittingScreens:
                 await self.prepare(sentence)
 
     def send_trial_reply(self, reply: TrialReply) -> None:
-        """Called by the trial's screen, which disarms itself."""
+        """Send the answer to a trial. Called by the trial's screen, which then takes no further keys by itself."""
         self._reply(reply)
 
     async def prepare(self, sentence: str = "") -> None:
-        """Show that the device is prepared, while nothing is asked; nothing in words before the language is known."""
+        """Show that the device is being prepared, while no request waits. sentence: empty before the language is
+        known."""
         self._number, self._shown, self._trial = 0, None, None
         if self._preparing is None:
             self._preparing = PreparingScreen(sentence)
@@ -149,10 +155,11 @@ class SittingScreens:
         self._preparing.say(sentence, afresh=covered)
 
     async def _ask(self, ask: Ask) -> None:
+        """Replace the previous request's screen by that of a new request."""
         self._drop()
         self._number = ask.number
         if self._preparing is not None and self._app.screen is self._preparing:
-            # Nothing but an empty screen is seen for a moment between two others.
+            # Cover the preparing screen: only an empty screen must show in the moment between two others.
             await self._app.push_screen(Screen())
         if ask.call is Call.ASK:
             trial = self._trial if self._trial is not None else await self._trial_screen()
@@ -160,7 +167,7 @@ class SittingScreens:
             return
         self._shown = screen_for(ask, self._keys, self.words)
         await self._app.push_screen(self._shown, partial(self._reply_once_dismissed, ask.number))
-        # Typed ahead, before what is asked here can have been read.
+        # Keys pressed before this screen could be read must not answer it.
         self._forget_earlier()
 
     async def _trial_screen(self) -> TrialScreen:
@@ -193,7 +200,7 @@ class SittingScreens:
         """Remove the previous request's screen and everything above it (help, commands)."""
         self._number = 0
         if self._trial is not None:
-            self._trial.show_saved()  # the engine goes on only when the answer is on the disk
+            self._trial.show_saved()  # the engine continues only after the answer is on disk
             self._trial.disarm()
         shown, self._shown = self._shown, None
         while shown is not None and shown in self._app.screen_stack:

@@ -1,4 +1,9 @@
-"""The two directions as oriented segments, distinguished by number, place and line style, and in words."""
+"""Drawings and descriptions of the two directions between which a participant decides.
+
+A direction is a line segment in a plane at an angle in degrees, counted from the plane's first axis towards its second;
+it has no sign. The two segments differ in number, position and line style, not in
+colour, so that they can be distinguished on every terminal. They are drawn with Braille dots (2 x 4 per character).
+"""
 
 import math
 from functools import lru_cache
@@ -15,23 +20,25 @@ ENDS = {
 """Keys of the words for the positive and the negative end of a plane's first and second axis."""
 
 SCREEN = {"yz": ((1, 0), (0, 1)), "xy": ((0, -1), (1, 0)), "zx": ((0, 1), (1, 0))}
-"""Where a plane's first and second axis point on the screen: (right, up). 'xy' is seen from above."""
+"""Where a plane's first and second axis point on the screen: (right, up). With x towards the operator, y to the right
+and z up, 'yz' is seen from the operator's side, 'xy' from above, and 'zx' from the left."""
 
 
 def sentence(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORDS) -> str:
-    """A direction in words, such as "1: up-left to down-right"."""
+    """A direction in words with its number (1 or 2), such as "1: up-left to down-right"."""
     return words.fill("direction", {"number": number, "ends": ends(picture, number, words)})
 
 
 def ends(picture: DirectionPicture, number: int, words: Words = ENGLISH_WORDS) -> str:
-    """Both ends of a direction in words, such as "up-left to down-right"."""
+    """Both ends of a direction (1 or 2) in words, such as "up-left to down-right"."""
     angle = picture.angle_deg[number - 1]
     start, end = _end_text(picture.plane, angle, words), _end_text(picture.plane, angle + 180, words)
     return words.fill("direction_ends", {"start": start, "end": end})
 
 
 def draw_directions(picture: DirectionPicture, columns: int = 18, rows: int = 9) -> list[str]:
-    """Both directions side by side: 1 solid, 2 dashed, each with its number below."""
+    """Lines of text with both directions side by side: 1 solid, 2 dashed, each with its number below. columns, rows:
+    size of each drawing in characters."""
     left = _draw_direction(picture.plane, picture.angle_deg[0], columns, rows, dashed=False)
     right = _draw_direction(picture.plane, picture.angle_deg[1], columns, rows, dashed=True)
     numbers = f"{'1'.center(columns)}    {'2'.center(columns)}"
@@ -40,7 +47,8 @@ def draw_directions(picture: DirectionPicture, columns: int = 18, rows: int = 9)
 
 @lru_cache(maxsize=64)
 def draw_large_direction(picture: DirectionPicture, number: int, columns: int, rows: int) -> tuple[str, ...]:
-    """One direction as large as fits: a thick segment with a head at both ends; 1 solid, 2 dashed."""
+    """One direction (1 or 2) as large as fits into columns x rows characters: a thick segment with an arrowhead at both
+    ends; 1 solid, 2 dashed."""
     canvas = Canvas(columns, rows)
     right, up = _on_screen(picture.plane, picture.angle_deg[number - 1])
     x, y = canvas.middle
@@ -50,6 +58,7 @@ def draw_large_direction(picture: DirectionPicture, number: int, columns: int, r
     shaft = reach - head
 
     def at(along: float, across: float = 0.0) -> tuple[float, float]:
+        # Point of the canvas from coordinates along and across the segment; y of the canvas points downwards.
         return x + along * right + across * up, y - along * up + across * right
 
     for side in (-1, 1):
@@ -61,14 +70,16 @@ def draw_large_direction(picture: DirectionPicture, number: int, columns: int, r
 
 
 def _half_length(picture: DirectionPicture, x: float, y: float) -> float:
-    """Half length of a segment, the same for both: neither may look stronger."""
+    """Half length of a segment in dots, the same for both directions, so that neither looks stronger. x, y: half width
+    and half height of the canvas."""
     sides = [_on_screen(picture.plane, angle) for angle in picture.angle_deg]
     fits = min(min(x / max(abs(right), 1e-9), y / max(abs(up), 1e-9)) for right, up in sides)
     return min(fits, 1.25 * min(x, y))
 
 
 def _dash_ends(half_length: float, dash: float, gap: float) -> list[tuple[float, float]]:
-    """Begin and end of each dash, evenly spaced, with a gap at both ends."""
+    """Begin and end of each dash along the segment from -half_length to half_length, evenly spaced, with a gap at both
+    ends. dash, gap: desired lengths, stretched so that a whole number of dashes fits."""
     count = max(1, round((2 * half_length - gap) / (dash + gap)))
     stretch = 2 * half_length / (count * dash + (count + 1) * gap)
     begins = [-half_length + stretch * (gap + i * (dash + gap)) for i in range(count)]
@@ -76,6 +87,7 @@ def _dash_ends(half_length: float, dash: float, gap: float) -> list[tuple[float,
 
 
 def _draw_direction(plane: str, angle_deg: float, columns: int, rows: int, dashed: bool) -> list[str]:
+    """Lines of text with a thin segment, with two barbs at each end."""
     canvas = Canvas(columns, rows)
     right, up = _on_screen(plane, angle_deg)
     cx, cy = (canvas.width - 1) / 2, (canvas.height - 1) / 2
@@ -92,12 +104,14 @@ def _draw_direction(plane: str, angle_deg: float, columns: int, rows: int, dashe
 
 
 def _on_screen(plane: str, angle_deg: float) -> tuple[float, float]:
+    """Unit vector of a direction on the screen, (right, up)."""
     first, second = SCREEN[plane]
     c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
     return c * first[0] + s * second[0], c * first[1] + s * second[1]
 
 
 def _end_text(plane: str, angle_deg: float, words: Words) -> str:
+    """One end of a direction in words; a component of at most 0.2 (about 11.5 degrees) is not mentioned."""
     (first_plus, first_minus), (second_plus, second_minus) = ENDS[plane]
     c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
     along_second = words[second_plus if s > 0 else second_minus]

@@ -1,6 +1,7 @@
 """The screen's end of the pipe: starts the engine, delivers its messages, and detects its end.
 
-The drawing thread never blocks: two other threads start the engine, write to it and read from it.
+The engine is the process that drives the device and runs the session; the screen only draws. The drawing thread never
+blocks: one further thread starts the engine and reads from it, another writes to it.
 """
 
 import contextlib
@@ -22,12 +23,12 @@ from study.tui.engine.from_engine import ErrorText, Failed, FromEngine, Opened
 from study.tui.engine.to_engine import Heartbeat, ToEngine
 
 CLOSING_S = 6.0
-"""Longest wait for the engine to end; one that lost its screen ends by itself sooner."""
+"""Longest wait (s) for the engine to end; an engine that lost its screen ends by itself sooner."""
 
 
 class EngineClient:
-    """deliver: called with each message of the engine, from a thread of this client. The last one is a `Failed` if
-    the engine dies."""
+    """Connection to one engine process. deliver: called with each message of the engine, from a thread of this client;
+    the last message is a `Failed` if the engine could not be started or ended unexpectedly."""
 
     def __init__(self, deliver: Callable[[FromEngine], None]) -> None:
         self._deliver = deliver
@@ -37,26 +38,27 @@ class EngineClient:
         self._closing = False
         self._opened: Opened | None = None
         self.dead = False
-        """The engine ended by itself; a new client can be started."""
+        """Whether the engine could not be started or ended without `close`; a new client can then be started."""
         self._thread = threading.Thread(target=self._run_thread, name="engine-client", daemon=True)
 
     @property
     def pid(self) -> int | None:
-        """Number of the engine's process; None before it has started."""
+        """Process identifier of the engine; None before it has started."""
         return self._process.pid if self._process is not None else None
 
     def start(self) -> None:
-        """Returns at once. Messages sent before the engine has started are queued."""
+        """Start the engine in the background and return at once. Messages sent before it runs are queued."""
         self._thread.start()
 
     def send(self, message: ToEngine) -> None:
-        """Returns at once. A heartbeat is dropped while other messages are queued: it would be late."""
+        """Queue a message and return at once. A heartbeat is dropped while other messages are queued, because it would
+        be late."""
         if not isinstance(message, Heartbeat) or self._outbox.empty():
             self._outbox.put(message)
 
     def close(self, patience_s: float = CLOSING_S) -> None:
-        """Close the pipe and wait for the engine to release the force, write its last line, and end. May be called
-        twice."""
+        """Close the pipe and wait up to `patience_s` (s) for the engine to release the force, write its last line of
+        the log, and end; then kill it. May be called twice."""
         self._closing = True
         self._outbox.put(None)
         if self._thread.ident is None:
@@ -68,6 +70,7 @@ class EngineClient:
             process.wait()
 
     def _run_thread(self) -> None:
+        """Start the engine, deliver its messages until the pipe ends, and report an unexpected end."""
         with tempfile.TemporaryFile() as output:
             try:
                 connection, process = start_child("study.tui.engine.engine", "run", output=output)
@@ -88,6 +91,7 @@ class EngineClient:
                 self._deliver(_death(code, _last_words(output), self._opened))
 
     def _read(self, connection: Connection) -> None:
+        """Deliver messages until the pipe ends or a message cannot be decoded."""
         try:
             while True:
                 message: FromEngine = connection.recv()
@@ -100,10 +104,11 @@ class EngineClient:
             traceback.print_exc()
 
     def _write(self, connection: Connection) -> None:
+        """Send the queued messages until None is queued, then end this direction of the pipe."""
         with contextlib.suppress(OSError):
             while (message := self._outbox.get()) is not None:
                 connection.send(message)
-        # The engine sees the end of the pipe, and this side the end of the engine.
+        # Only sending is shut down: the engine sees the end of the pipe, and its last messages still arrive here.
         with contextlib.suppress(OSError), socket.socket(fileno=os.dup(connection.fileno())) as end:
             end.shutdown(socket.SHUT_WR)
 
@@ -118,18 +123,22 @@ def _code_at_end(process: "subprocess.Popen[bytes]") -> int:
 
 
 def _not_started(problem: OSError) -> Failed:
+    """Message for an engine process that the system refused to start."""
     happened = f"The system refused to start the process that drives the device: {problem.strerror or problem}."
     do_now = "Close other programs, or start the computer anew, and begin again."
     return Failed(ErrorText("The device program cannot be started", happened, "", do_now, int(ExitCode.ERROR)))
 
 
 def _last_words(output: IO[bytes]) -> str:
+    """Last line that the engine printed, usually of a traceback; empty if it printed nothing."""
     output.seek(0)
     lines = output.read().decode(errors="replace").strip().splitlines()
     return lines[-1].strip() if lines else ""
 
 
 def _death(code: int, last_words: str, opened: Opened | None) -> Failed:
+    """Message for an engine that ended unexpectedly. code: exit code, negative for a signal. opened: the session that
+    can be resumed, if any."""
     how = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
     happened = f"The process that drives the device ended {how}."
     if last_words:

@@ -1,5 +1,8 @@
-"""Commands that the engine performs for the screen: lists, views, whole sittings, analyses, withdrawals; one after
-another."""
+"""Commands of the screen, as the engine performs them one after another.
+
+They are: lists and views of sessions and diagnoses, whole sittings, analyses, withdrawals, and the calibration of the
+accelerometer. Results and progress are sent to the screen as messages of `from_engine`.
+"""
 
 import contextlib
 import itertools
@@ -64,14 +67,15 @@ from study.workflows.views.send_request import send_request
 from study.workflows.views.view_session import session_view
 
 REPLY_S = 0.5
-"""A wait for a reply, which an interruption ends in between."""
+"""Longest single wait (s) for a reply; between two waits an interruption takes effect."""
 
 CALIBRATION_STOPPED = StudyError("The calibration was stopped", "", "Begin it again.", "Nothing was written.")
 """Error of a calibration that the user stopped."""
 
 
 class EngineCommands:
-    """`opened`: the session that the current command opened and has not finished, which can be resumed."""
+    """Performs the commands of one screen. `opened`: the session that the current command has opened and not finished,
+    which can be resumed; None without such a session."""
 
     def __init__(self, link: ScreenLink) -> None:
         self._link = link
@@ -81,7 +85,7 @@ class EngineCommands:
     def perform(self, command: Command) -> None:
         """Perform one command. Raises StudyError where it fails, KeyboardInterrupt where the user interrupts."""
         self.opened = None
-        # From here on a signal interrupts; earlier ones are ignored.
+        # An interruption that came after the command was sent, but before it was begun, takes effect here.
         if self._link.taken_is_let_go:
             raise KeyboardInterrupt
         match command:
@@ -105,6 +109,7 @@ class EngineCommands:
                 send_request(SessionFolder(Path(session)), request, self._clock)
 
     def _begin(self, order: SessionOrder) -> None:
+        """Plan and conduct a new session."""
         model = Path(order.model) if order.model else None
         plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data), model)
         for note in plan.notes:
@@ -113,6 +118,8 @@ class EngineCommands:
         self._conduct_sitting(words, lambda participant: conduct_new(plan.session, order.device, participant))
 
     def _resume(self, command: Resume) -> None:
+        """Continue a session, or write the missing results of a closed one. Raises WrongUseError for a session of a
+        simulated participant."""
         folder = find_session(command.session, Path(command.data))
         folded = fold_session(folder)
         observer = folded.state.opened.observer
@@ -134,12 +141,13 @@ class EngineCommands:
         self._conduct_sitting(words, lambda participant: conduct_resumed(folder, command.device, participant))
 
     def _conduct_sitting(self, words: Words, conduct: Callable[[Participant], ConductedSitting]) -> None:
+        """Conduct a sitting, write its results and send them. words: texts of the protocol's language."""
         self._link.send(ParticipantWords(words))
         self._link.send(Preparing(words["preparing_device"]))
         with self._participant() as participant:
             end = conduct(participant)
         if end.state.closed:
-            self.opened = None  # there is nothing left to go on with
+            self.opened = None  # a closed session cannot be resumed
         if not end.left:
             self._link.send(Preparing(words["preparing_report"]))
         written = end_sitting(end, self._clock.utc())
@@ -147,7 +155,8 @@ class EngineCommands:
 
     @contextlib.contextmanager
     def _participant(self) -> Iterator[Participant]:
-        self._link.requests.take()  # what was asked of an earlier session
+        """The participant at the screen, without requests and replies of an earlier session."""
+        self._link.requests.take()  # discard requests to an earlier session
         self._link.forget_replies()
         display = RemoteDisplay(self._link, self._clock)
         try:
@@ -156,11 +165,13 @@ class EngineCommands:
             self._link.stop_device = None
 
     def _report_requests(self, folder: SessionFolder, device: Device) -> None:
+        """Called when session and device are open: the screen's requests and its emergency stop reach them."""
         self.opened = folder
         self._link.stop_device = device.stop
         self._link.send(Opened(folder.name, str(folder.path)))
 
     def _withdraw(self, folder: SessionFolder) -> None:
+        """Erase the participant's sessions, and name copies that may exist elsewhere."""
         data, plan = folder.path.parent, plan_withdrawal(folder)
         elsewhere = copies_elsewhere(data, plan)
         withdraw(data, plan, self._clock.utc())
@@ -169,6 +180,8 @@ class EngineCommands:
         self._link.send(Withdrawn(plan.sessions))
 
     def _diagnose(self, wanted: Diagnose) -> None:
+        """Diagnose recordings, with progress, and send the result."""
+        # Imported here, because compilers and solvers take long to load.
         from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
         from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan
 
@@ -181,6 +194,8 @@ class EngineCommands:
         self._link.send(_diagnosis(written))
 
     def _calibrate(self, wanted: CalibrateSensor | KeepSensor) -> None:
+        """Calibrate the accelerometer with instructions on the screen, or store a calibration. Raises
+        CALIBRATION_STOPPED where the user interrupts."""
         if isinstance(wanted, KeepSensor):
             self._link.send(SensorKept(str(keep_accelerometer(wanted.table))))
             return
@@ -203,6 +218,7 @@ class EngineCommands:
 
 
 def _read_view(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Session | Diagnosis:
+    """The view that the command asks for."""
     match command:
         case ShowHome():
             return Home(_home_view(command))
@@ -213,14 +229,14 @@ def _read_view(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Sessio
 
 
 def _diagnosis(path: Path) -> Diagnosis:
-    # Compilers and solvers are loaded when they are needed.
+    # Imported here, because compilers and solvers take long to load.
     from study.workflows.views.view_diagnosis import diagnosis_view
 
     return Diagnosis(diagnosis_view(path))
 
 
 def _home_view(wanted: ShowHome) -> HomeView:
-    """The start screen, with the choices of the command line first."""
+    """Content of the start screen, with the protocol, device and model of the command line first in their lists."""
     view = home_view(Path(wanted.data))
     line = protocol_line(wanted.protocol, Path(wanted.data)) if wanted.protocol else None
     protocols = (line, *(other for other in view.protocols if other.name != line.name)) if line else view.protocols
@@ -232,6 +248,7 @@ def _home_view(wanted: ShowHome) -> HomeView:
 
 
 def _results(written: WrittenAnalysis) -> Results:
+    """The written analysis as a message, with thresholds and warnings as JSON text too."""
     document = {
         "thresholds": [asdict(threshold) for threshold in written.thresholds],
         "warnings": list(written.warnings),

@@ -1,4 +1,8 @@
-"""The display port over the pipe: asks the screen, and never waits longer than the limits of a vibration."""
+"""The engine's implementation of the display port (`display.Display`), by messages to the screen process.
+
+While a stimulus may play, no wait between two signs of life is longer than `GLANCE_S`, so that the safety limits of the
+vibration hold even if the screen hangs. A screen without heartbeat ends the trial.
+"""
 
 import math
 from collections.abc import Callable
@@ -32,22 +36,24 @@ from study.workflows.checks.computer_load import load_per_processor
 from study.workflows.trial.display import SignOfLife
 
 GLANCE_S = 0.04
-"""Interval of the signs of life; the port allows 100 ms."""
+"""Interval of the signs of life (s); the port allows 0.1 s."""
 POLL_EVERY_S = 0.1
-"""Interval at which a wait looks for requests (s)."""
+"""Interval (s) at which the wait for the handle reads its position again."""
 UNSHOWN_S = 1.0
-"""A shorter wait for the handle is not shown."""
+"""Time (s) from which a wait for the handle is shown even where the handle is in its place."""
 SILENT_AFTER_S = 0.5
-"""A screen without heartbeat for this long is suspended, dead or hung: a stimulus could not be stopped."""
+"""Time (s) without a heartbeat after which the screen counts as suspended, ended or hung. The participant could then
+not stop a stimulus."""
 
 CUT_SHORT = Unanswered("the stimulus ended early", leave=False)
-"""Reply where a sign of life ended the wait."""
+"""Reply where the sign of life returned False, which ends the wait."""
 TOO_LATE = Unanswered("no answer within the time limit", leave=False, cause=VoidCause.LATE)
 """Reply after the question's time limit."""
 
 
 class RemoteDisplay:
-    """Any method raises KeyboardInterrupt if the screen is gone."""
+    """The display port over a pipe; the docstrings of `Display` apply. Any method raises KeyboardInterrupt if the
+    screen process has ended. load: gives the load average per processor, None if unknown."""
 
     def __init__(self, link: ScreenLink, clock: Clock, load: Callable[[], float | None] = load_per_processor) -> None:
         self._link = link
@@ -55,7 +61,7 @@ class RemoteDisplay:
         self._load = load
         self._number = 0
         self._late_s = 0.0
-        """Longest delay of this program's own wake-ups since a question was asked."""
+        """Longest delay (s) of this process's own wake-ups since the last request was shown."""
 
     def fill_in(self, form: Form) -> FormReply:
         reply: FormReply = self._ask_screen(Call.FILL_IN, form)
@@ -93,8 +99,8 @@ class RemoteDisplay:
         return None
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Shown only if the handle is away from its place or the wait is long: in most trials the handle is already
-        there."""
+        """As in the port. The wait is shown only if the handle is away from its place or the wait is long, because in
+        most trials the handle is in its place already."""
         number, view, self._late_s = 0, look(), 0.0
         began_s = looked_s = self._clock.now_s()
         while not view.ready:
@@ -139,7 +145,8 @@ class RemoteDisplay:
         self._ask_screen(Call.PRACTICE_OVER, result)
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
-        """The rest is enforced here: if the screen returns too early, the remaining time is waited."""
+        """As in the port. The duration is enforced here: if the screen replies too early, the remaining time is
+        waited."""
         number = self._show(Call.REST, notice)
         started_s = self._clock.now_s()
         back = False
@@ -170,36 +177,40 @@ class RemoteDisplay:
         self._link.send(Trouble(sentence))
 
     def _ask_screen(self, call: Call, shown: Any) -> Any:
-        """Ask while nothing plays: a screen may be suspended for any time."""
+        """Show a request and wait without limit for the reply. Only while nothing plays, because the screen may be
+        suspended for any time."""
         number = self._show(call, shown)
         while (reply := self._reply(number)) is None:
             pass
         return reply.value
 
     def _show(self, call: Call, shown: Any) -> int:
+        """Send a request to the screen; returns its number, which the reply carries."""
         self._number += 1
         self._late_s = 0.0
         self._link.send(Ask(self._number, call, shown))
         return self._number
 
     def _reply(self, number: int, patience_s: float = GLANCE_S) -> Reply | None:
-        """The screen's reply to this request; None if none came in time, or one to an earlier request."""
+        """The screen's reply to this request; None if no reply came within `patience_s` (s), or only a reply to an
+        earlier request."""
         began_s = self._clock.now_s()
         reply = self._link.reply(patience_s)
         self._late_s = max(self._late_s, self._clock.now_s() - began_s - patience_s)
         return reply if reply is not None and reply.number == number else None
 
     def _silent(self) -> bool:
+        """Whether the screen's last sign of life is older than `SILENT_AFTER_S`."""
         return self._link.silent_s() > SILENT_AFTER_S
 
     def _cut_short(self, number: int, why: Unanswered) -> Unanswered:
-        """number: 0 where nothing is shown."""
+        """Close the request on the screen and return the reason. number: of the request, 0 where nothing is shown."""
         if number:
             self._link.send(Close(number))
         return why
 
 
 def silent(engine_late_s: float, load_per_processor: float | None) -> Unanswered:
-    """Result of a trial whose screen sent no heartbeat."""
+    """Result of a trial whose screen sent no heartbeat. Arguments as in `why_screen_silent`."""
     reason = why_screen_silent(engine_late_s, load_per_processor)
     return Unanswered(reason, leave=False, cause=VoidCause.SCREEN_LATE)

@@ -1,4 +1,8 @@
-"""The labelled demonstration: both directions at each vibration, as often as wanted."""
+"""Screen of the labelled demonstration before the trials, in which a participant feels each direction of motion.
+
+The participant plays both directions at each vibration frequency as often as wanted, with the labels shown, and so
+learns what the answers of the later trials mean. The screen returns one choice at a time; the session plays it.
+"""
 
 from typing import ClassVar
 
@@ -20,9 +24,11 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class DemoScreen(TranslatedScreen[DemoChoice]):
-    """Both directions with the vibration that is chosen, and which ones were felt. 1 and 2 (and further answer keys)
-    play a direction, the arrow keys, b and n choose a slower or faster vibration, p pauses, Enter ends. Dismissed with
-    the choice."""
+    """Shows both directions at the selected vibration, and which of them were felt already.
+
+    Keys: 1 and 2 (or other answer keys) play a direction, the arrow keys, b and n select a slower or faster vibration,
+    p pauses, Enter ends. Dismissed with PlayDemo or DemoDone.
+    """
 
     PAGE = "help_demo"
     DEFAULT_CSS = """
@@ -43,7 +49,7 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
     ]
 
     class PauseWanted(Message):
-        """p was pressed; a choice of the demonstration cannot say it."""
+        """Posted when p is pressed: a pause is no `DemoChoice`, so the screen cannot return it."""
 
     def __init__(self, menu: DemoMenu, keys: AnswerKeys = DIGITS, words: Words = ENGLISH_WORDS) -> None:
         super().__init__(words)
@@ -66,15 +72,17 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
         self._show(self.words.fill("demo_how", {"keys": self._keys.choice(self.words)}))
 
     def on_key(self, event: Key) -> None:
+        """Dismiss with the direction to play if an answer key was pressed."""
         answer = self._keys.answer(event.character or event.key)
         if answer is not None:
             event.stop()
             dismiss_screen(self, PlayDemo(self._vibration, answer))
 
     def action_heard(self, answer: int) -> None:
-        """Gives the footer its entry; the answers are handled in `on_key`."""
+        """Does nothing: the binding exists for its entry in the footer; `on_key` handles the answers."""
 
     def action_turn(self, step: int) -> None:
+        """Select the next slower (-1) or faster (1) vibration; at the end of the range, say so."""
         turned = self._vibration + step
         if turned < 1:
             self._show(self.words["demo_slowest"])
@@ -85,10 +93,12 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
             self._show(felt_so_far(self._menu, self._vibration, self.words))
 
     def action_pause(self) -> None:
+        """Ask the application for a pause."""
         self.post_message(self.PauseWanted())
 
     def action_done(self) -> None:
-        """Confirm once if something was not felt yet, because Enter is often pressed by habit."""
+        """End the demonstration. If a stimulus was not felt yet, Enter must be pressed twice: it is often pressed by
+        habit."""
         unfelt = 2 * self._menu.vibrations - len(set(self._menu.felt))
         if unfelt and not self._asked:
             self._asked = True
@@ -97,6 +107,7 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
         dismiss_screen(self, DemoDone())
 
     def _show(self, sentence: str) -> None:
+        """Redraw title, steps and panels for the selected vibration, with a sentence below."""
         menu = self._menu
         self.query_one("#title", LiteralText).update(
             self.words.fill("demo_title", {"vibration": self._vibration, "vibrations": menu.vibrations})
@@ -107,5 +118,6 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
         self.query_one("#message", LiteralText).update(sentence)
 
     def _step(self, vibration: int) -> str:
+        """One vibration in the row of steps: its number, a mark per direction felt, brackets if selected."""
         ticks = "".join("✓" if (vibration, number) in self._menu.felt else "·" for number in (1, 2))
         return f"[{vibration} {ticks}]" if vibration == self._vibration else f" {vibration} {ticks} "

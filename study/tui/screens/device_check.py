@@ -1,4 +1,4 @@
-"""Findings of the device check, with advice."""
+"""Screen with the findings of the device check, which measures before a session whether the device is in order."""
 
 from typing import ClassVar
 
@@ -15,8 +15,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class DeviceCheckScreen(TranslatedScreen[bool]):
-    """The findings about the device with advice, and a conclusion. Enter goes on where it can be used, g all the same
-    where it cannot, c checks again. True: go on. False: check again."""
+    """The findings about the device with advice, and a conclusion. Keys: Enter continues if the device is usable, g
+    continues although it is not, c repeats the check. Result of the screen: True = continue, False = check again."""
 
     PAGE = "help_check"
     DEFAULT_CSS = """
@@ -31,10 +31,12 @@ class DeviceCheckScreen(TranslatedScreen[bool]):
     ]
 
     def __init__(self, report: DeviceReport, words: Words = ENGLISH_WORDS) -> None:
+        """report: findings of the check; words: texts in the language of the screen."""
         super().__init__(words)
         self._report = report
 
     def compose(self) -> ComposeResult:
+        """Title, one line per finding with advice where it is not fine, and the conclusion."""
         report, words = self._report, self.words
         names = max((len(finding.name) for finding in report.findings), default=0)
         with Sheet():
@@ -50,24 +52,30 @@ class DeviceCheckScreen(TranslatedScreen[bool]):
         yield Footer(show_command_palette=False)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Enable Enter only for a usable device, and g only for one that is not usable."""
         usable = self._report.usable
         return {"go_on": usable, "go_on_anyway": not usable}.get(action, True)
 
     def action_go_on(self) -> None:
+        """Continue with a usable device."""
         dismiss_screen(self, True)
 
     def action_go_on_anyway(self) -> None:
+        """Continue although the device is not usable."""
         dismiss_screen(self, True)
 
     def action_check_again(self) -> None:
+        """Close the screen, so that the device is checked again."""
         dismiss_screen(self, False)
 
 
 def _conclusion(report: DeviceReport, words: Words) -> str:
+    """The last sentence: whether the device is ready, ready with a warning, or needs attention."""
     if not report.usable:
         return words["check_look"]
     return f"{words['check_ready' if report.fine else 'check_ready_warning']} {words['enter_goes_on']}"
 
 
 def _line(finding: DeviceFinding, names: int) -> str:
+    """One finding: verdict, name padded to `names` characters, measured value."""
     return f"{'LOOK' if finding.wrong else finding.verdict:<4}  {finding.name:<{names}}  {finding.value}"

@@ -1,4 +1,7 @@
-"""Input of a diagnosis: recordings or a session, and the model to compare with."""
+"""Form for the input of a diagnosis: recordings or a session, and the model of the device to compare with.
+
+The form checks only that the named paths exist; the engine runs the diagnosis (`Diagnose`).
+"""
 
 import shlex
 from pathlib import Path
@@ -44,8 +47,8 @@ FIELDS = (
 
 
 class DiagnoseForm(ModalScreen[None]):
-    """Asks for recordings, model, clean recordings and folder of a diagnosis. F5 or Enter checks the paths and posts
-    the request, Esc goes back."""
+    """Asks for the recordings, the model, the reference recordings and the results folder of a diagnosis. F5 or Enter
+    checks the paths and posts the request, Esc goes back."""
 
     HELP = HELP
     CSS = """
@@ -61,10 +64,11 @@ class DiagnoseForm(ModalScreen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f5", "begin", "Diagnose", priority=True),
         Binding("escape", "leave", "Back", key_display="Esc"),
-        Binding("f1", "help", "Help"),  # the application's own keys do not reach through a modal screen
+        Binding("f1", "help", "Help"),  # a modal screen hides the application's own keys
     ]
 
     def __init__(self, source: str = "") -> None:
+        """source: recording or session with which the form is filled in; empty = none."""
         super().__init__()
         self._source = source
 
@@ -84,6 +88,7 @@ class DiagnoseForm(ModalScreen[None]):
 
     @on(Input.Submitted)
     def action_begin(self) -> None:
+        """Check the paths; post the request, or show what is wrong and move to that field."""
         named: dict[str, tuple[str, ...]] = {}
         for field in ("sources", "clean"):
             try:

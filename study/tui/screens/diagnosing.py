@@ -1,4 +1,4 @@
-"""Progress of a running diagnosis, which can be stopped."""
+"""Screen that shows the progress of a running diagnosis, and lets the user stop it."""
 
 import time
 from collections.abc import Callable
@@ -41,6 +41,7 @@ class DiagnosingScreen(Screen[bool]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "stop", "Stop", key_display="Esc")]
 
     def __init__(self, what: str, now_s: Callable[[], float] = time.monotonic) -> None:
+        """what: the first step, as a sentence; now_s: a monotonic clock (s)."""
         super().__init__()
         self._what = what
         self._now_s = now_s
@@ -58,12 +59,13 @@ class DiagnosingScreen(Screen[bool]):
         self.set_interval(TICK_S, self._tick)
 
     def show(self, what: str, share: float) -> None:
-        """what: the current step as a sentence without capital and full stop; share: done, 0 to 1."""
+        """Show the current step and progress. what: sentence without capital letter and full stop; share: 0 to 1."""
         if self.query("#what"):
             self.query_one("#what", Static).update(f"{what[:1].upper()}{what[1:]}.")
             self.query_one(ProgressBar).update(progress=share)
 
     def action_stop(self) -> None:
+        """Leave the screen with True: the diagnosis is to be stopped."""
         dismiss_screen(self, True)
 
     def _tick(self) -> None:

@@ -1,4 +1,7 @@
-"""A note for the log by the person at the screen, or a report of an adverse event."""
+"""Dialog to write a note into the session's log, or to report an adverse event such as pain.
+
+Each note states its writer (participant or experimenter); a report of an adverse event is marked as such.
+"""
 
 from typing import ClassVar
 
@@ -18,14 +21,16 @@ from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.literal_text import LiteralText
 
 MOST_CHARACTERS = 500
-"""Longest note: a few sentences, so that a line of the log stays readable."""
+"""Maximum length of a note: a few sentences, so that a line of the log stays readable."""
 WRITERS: tuple[Who, ...] = ("participant", "experimenter")
-"""Writers to choose from, in this order."""
+"""Writers among whom the dialog lets the user choose, in this order."""
 
 
 class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | None]):
-    """Fields for a text, its writer, and whether it reports an adverse event. Ctrl-S or the button writes it, Esc
-    leaves. Dismissed with None if nothing is to be written."""
+    """Fields for the text, its writer, and whether it reports an adverse event.
+
+    Ctrl-S or the button writes the note, Esc cancels. Dismissed with the note (NoteAsked), or with None after a cancel.
+    """
 
     PAGE = "help_note"
     DEFAULT_CSS = """
@@ -62,10 +67,12 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
 
     @on(ChoiceRow.Left)
     def _next(self) -> None:
+        """Move the focus to the next field when a row of choices is left."""
         self.focus_next()
 
     @on(Button.Pressed)
     def action_save(self) -> None:
+        """Dismiss with the note; refuse an empty or too long text, and a note without a writer."""
         text = " ".join(self.query_one(TextArea).text.split())
         who = self.query_one("#who", ChoiceRow).chosen
         if not text:
@@ -78,10 +85,13 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
             dismiss_screen(self, NoteAsked(WRITERS[who], text, self.query_one("#adverse", ChoiceRow).chosen == 1))
 
     def action_leave(self) -> None:
+        """Dismiss without a note."""
         dismiss_screen(self, None)
 
     def action_help(self) -> None:
+        """Open the help page of this dialog."""
         self.app.push_screen(HelpScreen(self.HELP, self.words))
 
     def _refuse(self, sentence: str) -> None:
+        """Show the reason why the note cannot be written."""
         self.query_one("#message", LiteralText).update(sentence)

@@ -1,4 +1,5 @@
-"""While the device is prepared: current step and elapsed time. No bar, because the duration is unknown."""
+"""Screen that is shown while the device is prepared: current step and elapsed time. It has no progress bar, because the
+duration is unknown."""
 
 import time
 from collections.abc import Callable
@@ -11,14 +12,14 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.translated_screen import TranslatedScreen
 
 TICK_S = 0.5
-"""Interval at which the elapsed time is drawn (s)."""
+"""Interval (s) at which the elapsed time is drawn."""
 SILENT = "…"
-"""Shown in place of a sentence."""
+"""Shown as long as there is no sentence."""
 
 
 class PreparingScreen(TranslatedScreen[None]):
-    """The current step of a preparation and the elapsed time; no keys. Without a sentence it says nothing: until the
-    protocol was read, the participant's language is not known."""
+    """The current step of a preparation and the elapsed time; no keys. Without a sentence the screen has no text,
+    because the participant's language is not known before the protocol was read."""
 
     PAGE = "help_preparing"
     CSS = """
@@ -32,6 +33,7 @@ class PreparingScreen(TranslatedScreen[None]):
     def __init__(
         self, sentence: str, now_s: Callable[[], float] = time.monotonic, words: Words = ENGLISH_WORDS
     ) -> None:
+        """sentence: the first step, or empty; now_s: a monotonic clock (s)."""
         super().__init__(words)
         self._sentence = sentence
         self._now_s = now_s
@@ -50,7 +52,7 @@ class PreparingScreen(TranslatedScreen[None]):
         self.set_interval(TICK_S, self._tick)
 
     def say(self, sentence: str, afresh: bool = False) -> None:
-        """Show the current step; afresh: another wait begins, so the time restarts."""
+        """Show the current step. afresh: whether another wait begins, so that the elapsed time restarts."""
         self._sentence = sentence
         if afresh:
             self._began_s = self._now_s()
@@ -77,6 +79,6 @@ class PreparingScreen(TranslatedScreen[None]):
 
 
 def describe_elapsed(seconds: float, words: Words = ENGLISH_WORDS) -> str:
-    """Elapsed time in words."""
+    """Elapsed time in words: minutes and seconds, or seconds alone below a minute."""
     minutes, left = divmod(int(seconds), 60)
     return words.fill("elapsed_min" if minutes else "elapsed_s", {"minutes": minutes, "seconds": left})

@@ -1,4 +1,8 @@
-"""The accelerometer laid down in six positions, step by step."""
+"""Screen that guides through the six-position calibration of the accelerometer, step by step.
+
+The engine reads the sensor and computes the calibration (`study.devices.accelerometer.calibration`); this screen shows
+its messages and sends the user's replies.
+"""
 
 from typing import ClassVar
 
@@ -34,14 +38,14 @@ In a terminal: `hapteq doctor --calibrate-sensor PORT --keep`.
 FIELDS = (("port", "Port", "/dev/ttyACM0"), ("baud", "Baud", "2000000"))
 """Key, title and hint of each field."""
 BAUD = 2_000_000
-"""Default rate of the serial line."""
+"""Default rate of the serial line, bit/s."""
 STEPS = 6
-"""Positions of the calibration."""
+"""Number of positions of the calibration."""
 
 
 class SensorScreen(Screen[None]):
-    """Guides through the six positions of the calibration; the engine reads the sensor. F5 begins, Enter says that the
-    sensor lies as asked and, at the end, writes the result into the lab's file; Esc stops or goes back."""
+    """Guides through the six positions of the calibration. F5 begins; Enter confirms that the sensor lies as requested
+    and, at the end, has the result written into the lab's file; Esc stops or goes back."""
 
     HELP = HELP
     CSS = """
@@ -64,8 +68,11 @@ class SensorScreen(Screen[None]):
     def __init__(self) -> None:
         super().__init__()
         self._waits_for: LayDown | None = None
+        """Position that the user must confirm; None where none is requested."""
         self._under_way = False
+        """Whether a calibration is running."""
         self._table = ""
+        """Result (TOML) that Enter writes into the lab's file; empty where there is none."""
 
     def compose(self) -> ComposeResult:
         with Vertical() as box:
@@ -82,7 +89,7 @@ class SensorScreen(Screen[None]):
         self.query_one("#port", Input).focus()
 
     def hear(self, message: LayDown | Calibrated | SensorKept) -> None:
-        """Show the next position, the result, or that it was written."""
+        """Handle a message of the engine: show the next position, the result, or that the result was written."""
         match message:
             case LayDown(number=number, position=position, heard=heard):
                 self._waits_for = message
@@ -98,13 +105,14 @@ class SensorScreen(Screen[None]):
                 self._show_line(f"Written into {file}. `hapteq doctor` checks the sensor. Esc goes back.")
 
     def begin_again(self) -> None:
-        """Reset the screen after an error, which a panel above it shows."""
+        """Reset the screen after an error; a panel above the screen shows the error."""
         self._waits_for, self._under_way, self._table = None, False, ""
         self._show_line("F5 begins again.")
         self.query_one("#seen", Static).update("")
         self._lock(False)
 
     def action_begin(self) -> None:
+        """Check port and baud rate, and start the calibration; no effect while it is running."""
         port = self.query_one("#port", Input).value.strip()
         baud = self.query_one("#baud", Input).value.strip() or str(BAUD)
         if self._under_way:
@@ -121,6 +129,7 @@ class SensorScreen(Screen[None]):
             self.post_message(CommandWanted(CalibrateSensor(port, int(baud))))
 
     def action_go_on(self) -> None:
+        """Enter: confirm the position, else have the result written, else begin from a field."""
         if self._waits_for is not None:
             self._note(f"{self._waits_for.position}: listening, leave it at rest…")
             self.post_message(CommandWanted(Reply(self._waits_for.number, True)))
@@ -133,12 +142,14 @@ class SensorScreen(Screen[None]):
             self.action_begin()
 
     def action_leave(self) -> None:
+        """Close the screen, and stop a running calibration."""
         if self._under_way:
             self.post_message(CommandWanted(LetGo()))
         dismiss_screen(self, None)
 
     @on(Input.Changed)
     def _unsay(self) -> None:
+        """Replace a message about a field once the field is edited."""
         if not self._under_way:
             self._show_line("F5 begins.")
 
@@ -154,7 +165,7 @@ class SensorScreen(Screen[None]):
         self.query_one("#do", Static).update(text)
 
     def _note(self, text: str) -> None:
-        """A line for each position; what is known of it replaces what was said while it was heard."""
+        """Append a line about a position; its reading (✓) replaces the line that was shown during the measurement."""
         seen = self.query_one("#seen", Static)
         lines = [line for line in str(seen.content).split("\n") if line]
         if text.startswith("✓") and lines:

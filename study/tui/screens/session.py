@@ -1,4 +1,7 @@
-"""One past session: facts, results, and possible actions."""
+"""Screen of one past session: its facts, thresholds, staircases, log and report, and the actions that it allows.
+
+The screen shows a `SessionView` and posts messages; the application and its engine act on these.
+"""
 
 from pathlib import Path
 from typing import ClassVar
@@ -48,8 +51,9 @@ In a terminal: `hapteq show SESSION`, `hapteq resume SESSION`, `hapteq analyze S
 
 
 class SessionScreen(Screen[None]):
-    """One past session on five pages, which the keys 1 to 5 choose. r resumes it, w watches, a analyses, d diagnoses, x
-    withdraws the participant, o opens the report, Esc goes back; each only where the session allows it."""
+    """One past session on five pages, which the keys 1 to 5 select. r resumes the session, w watches it, a analyses it,
+    d diagnoses the device, x withdraws the participant, o opens the report, Esc returns to the start screen;
+    `check_action` disables actions that the session does not allow."""
 
     HELP = HELP
     CSS = """
@@ -78,7 +82,7 @@ class SessionScreen(Screen[None]):
         self._view = view
 
     def show(self, view: SessionView) -> None:
-        """A newer view, such as after an analysis; the page is kept."""
+        """Show a newer view, such as after an analysis; the selected page is kept."""
         page = self.query_one(TabbedContent).active
         self._view = view
 
@@ -112,7 +116,7 @@ class SessionScreen(Screen[None]):
         yield Footer(show_command_palette=False)
 
     def on_tabbed_content_tab_activated(self) -> None:
-        """Arrow keys scroll the page at once."""
+        """Focus the new page, so that arrow keys scroll it at once."""
         self._focus_page()
 
     def action_page(self, tab: str) -> None:
@@ -120,6 +124,7 @@ class SessionScreen(Screen[None]):
         self._focus_page()
 
     def _focus_page(self) -> None:
+        """Focus the part of the selected page that scrolls."""
         pane = self.query_one(TabbedContent).active_pane
         if pane is not None:
             for scrolled in pane.query("VerticalScroll, LongText"):
@@ -152,7 +157,7 @@ class SessionScreen(Screen[None]):
         self.app.push_screen(WithdrawPrompt(self._view.line.subject), act_on_decision)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """The footer shows only what this session allows."""
+        """Whether this session allows an action; the footer shows only allowed actions."""
         line = self._view.line
         match action:
             case "resume":
@@ -174,8 +179,9 @@ def file_url(path: str) -> str:
 
 
 def open_report(app: App[object], path: str) -> None:
-    """Open a page in a browser of this machine; where the screen itself is in a browser, in a tab beside it, to which
-    the page is sent: no browser goes from a page of a server to a file."""
+    """Open an HTML report in a browser of this machine. Where the screen itself runs in a browser, the file's content
+    is sent to a new tab, because a browser refuses links from a served page to a local file. A notification tells of a
+    file that cannot be read."""
     if app.is_web:
         try:
             app.deliver_binary(path, open_method="browser", mime_type="text/html")
@@ -187,6 +193,7 @@ def open_report(app: App[object], path: str) -> None:
 
 
 def _head(view: SessionView) -> Content:
+    """First line of the screen: name, status and protocol of the session."""
     line = view.line
     parts: list[Content | str | tuple[str, str]] = [
         (line.name, "bold"),
@@ -198,7 +205,7 @@ def _head(view: SessionView) -> Content:
 
 
 def _facts(facts: tuple[tuple[str, str], ...]) -> Table:
-    """A table that wraps long values."""
+    """Facts as a table of two columns, of which the second wraps."""
     table = Table.grid(padding=(0, 2, 0, 0))
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
@@ -208,6 +215,7 @@ def _facts(facts: tuple[tuple[str, str], ...]) -> Table:
 
 
 def _bullets(sentences: tuple[str, ...]) -> Table:
+    """Warnings as a bulleted list; a sentence where there are none."""
     table = Table.grid(padding=(0, 1, 0, 0))
     for sentence in sentences or ("Nothing stands out.",):
         table.add_row("•", Text(sentence))
@@ -215,6 +223,7 @@ def _bullets(sentences: tuple[str, ...]) -> Table:
 
 
 def _thresholds(view: SessionView) -> ComposeResult:
+    """The table of thresholds and its explanation; a sentence where no run is complete."""
     if not view.thresholds:
         yield Static("No test run is complete, so there is no threshold yet.", markup=False)
         return
@@ -230,6 +239,7 @@ def _thresholds(view: SessionView) -> ComposeResult:
 
 
 def _report(view: SessionView) -> str:
+    """Text of the report page: paths of report and figures, and the warnings."""
     if not view.report:
         lines = ["No report was written yet."]
         if view.line.standing in ("finished", "unfinished") and view.line.answers:

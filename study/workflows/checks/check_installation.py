@@ -1,4 +1,7 @@
-"""Check that this computer has what a study needs: Python, packages, a terminal, a folder to write to."""
+"""Check that this computer meets the requirements of a study: Python and packages, terminal, data folder, privacy.
+
+Each check returns a `DeviceFinding`, with advice where something is wrong; a missing part is a finding, not an error.
+"""
 
 import importlib.util
 import locale
@@ -22,18 +25,18 @@ from study.store.disk.privacy import privacy_warning
 HAPTEQ = "hapteq"
 """Name of the installed distribution."""
 IMPORT_NAMES = ("study", "analysis", "equalizer", "protocols")
-"""Packages of hapteq that a foreign package of the same name could hide."""
+"""Top-level packages of hapteq, whose generic names another distribution or file could shadow."""
 
 SMALLEST = (80, 24)
 """Columns and rows of a terminal in which every screen fits."""
 
 ROOM_BYTES = 10**9
-"""Free disk space that is enough for about ten sessions with all recordings."""
+"""Free disk space (bytes) that is enough for about ten sessions with all recordings."""
 
 
 @dataclass(frozen=True, slots=True)
 class Terminal:
-    """Properties of the terminal that the check of the installation judges."""
+    """Properties of a terminal that are checked: character encoding, type, and size in characters."""
 
     encoding: str
     kind: str
@@ -43,8 +46,8 @@ class Terminal:
 
 
 def check_installation(data: Path, terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
-    """All findings. `terminal`: from `this_terminal()`. Writes one empty file into `data`, or into the folder that
-    would contain it."""
+    """All findings. data: folder of the sessions. terminal: from `this_terminal()`. Writes a temporary empty file into
+    `data`, or into its nearest existing parent."""
     owners, home = packages_distributions(), Path(study.__file__).parents[1]
     return (
         *check_packages(),
@@ -56,7 +59,7 @@ def check_installation(data: Path, terminal: Terminal | None) -> tuple[DeviceFin
 
 
 def check_packages() -> tuple[DeviceFinding, ...]:
-    """Python and what hapteq was installed with, against what it needs."""
+    """Versions of Python and of the installed packages, against the requirements of the installed hapteq."""
     try:
         wanted_python, wanted = metadata(HAPTEQ)["Requires-Python"], requires(HAPTEQ) or []
     except PackageNotFoundError:
@@ -70,7 +73,7 @@ def check_packages() -> tuple[DeviceFinding, ...]:
 
 
 def check_requirement(requirement: Requirement) -> DeviceFinding:
-    """Whether an installed package satisfies a requirement."""
+    """Whether the installed package, if there is one, satisfies a requirement."""
     try:
         return check_version(requirement.name, version(requirement.name), requirement.specifier)
     except PackageNotFoundError:
@@ -78,14 +81,15 @@ def check_requirement(requirement: Requirement) -> DeviceFinding:
 
 
 def check_version(name: str, found: str, wanted: SpecifierSet) -> DeviceFinding:
-    """Whether a version satisfies a specifier."""
+    """Whether a version satisfies a specifier; prereleases count."""
     fine = wanted.contains(found, prereleases=True)
     needs = f" (needs {wanted})" if str(wanted) else ""
     return DeviceFinding(name, f"{found}{needs}", fine, "" if fine else _INSTALL)
 
 
 def check_name(name: str, owners: Mapping[str, Sequence[str]], home: Path) -> DeviceFinding:
-    """Whether the package of this generic name is hapteq's own. owners: distributions that install it."""
+    """Whether `import name` gives hapteq's own package. owners: distributions by the top-level names that they install.
+    home: folder that contains hapteq's packages."""
     others = sorted(set(owners.get(name, ())) - {HAPTEQ})
     if others:
         advice = f"Install hapteq into an environment of its own: {', '.join(others)} must not share one with it."
@@ -99,7 +103,7 @@ def check_name(name: str, owners: Mapping[str, Sequence[str]], home: Path) -> De
 
 
 def this_terminal() -> Terminal | None:
-    """The terminal of stdout or stderr; None if neither is one."""
+    """The terminal of stdout, else that of stderr; None if neither is a terminal."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None and stream.isatty():
             size = os.get_terminal_size(stream.fileno())
@@ -109,7 +113,7 @@ def this_terminal() -> Terminal | None:
 
 
 def check_terminal(terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
-    """Encoding, colours and size of the terminal."""
+    """Encoding, size and colours of the terminal. No terminal is fine: the check may run in a script."""
     if terminal is None:
         return (DeviceFinding("Terminal", "none here, so it was not checked", fine=True),)
     unicode = terminal.encoding.lower().replace("-", "") == "utf8"
@@ -130,7 +134,8 @@ def check_terminal(terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
 
 
 def check_folder(data: Path) -> DeviceFinding:
-    """Whether sessions can be written below it. A missing folder is created by the first session."""
+    """Whether sessions can be written below `data`, and whether `ROOM_BYTES` are free. A missing folder is fine: the
+    first session creates it."""
     name = "Data folder"
     folder = next(place for place in (data.absolute(), *data.absolute().parents) if place.exists())
     try:
@@ -155,10 +160,12 @@ def check_privacy(data: Path) -> DeviceFinding:
 
 
 def _always(requirement: Requirement) -> bool:
+    """Whether a requirement applies on this computer, without any optional extra."""
     return requirement.marker is None or requirement.marker.evaluate({"extra": ""})
 
 
 def _colours(kind: str) -> str:
+    """Number of colours of a terminal in words, by the environment. kind: value of TERM."""
     if os.environ.get("NO_COLOR"):
         return "switched off by NO_COLOR; nothing is told by colour alone"
     if os.environ.get("COLORTERM") in ("truecolor", "24bit"):

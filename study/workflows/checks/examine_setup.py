@@ -1,4 +1,8 @@
-"""All checks before a study day: installation, device, and 1 kHz timing."""
+"""All checks of a set-up before a study: installation, device, and timing of the 1 kHz force loop.
+
+The timing of the device's loop is compared with that of a bare loop in a process of its own, which separates delays of
+the computer from those of this program. After a successful examination a device may be accepted for use with a hand.
+"""
 
 import contextlib
 from collections.abc import Callable
@@ -22,13 +26,13 @@ from study.workflows.checks.daily_check import MotionCallbacks, record_baseline
 from study.workflows.device_settings import device_settings
 
 PROTOCOL = "direction_threshold"
-"""The device is opened with the limits of this protocol."""
+"""Protocol whose safety limits and settings the device is opened with."""
 
 NOT_NEEDED = ("Accelerometer",)
-"""Findings that do not affect the force."""
+"""Names of findings that do not affect the force: they do not prevent the use of the device."""
 
 SPARE_S = 5.0
-"""Margin (s) beyond the timing's length before the safety layer ends it."""
+"""Margin (s) by which the longest permitted hold exceeds the duration of the timing measurement."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,23 +42,23 @@ class Examination:
     installation: tuple[DeviceFinding, ...]
     device: DeviceReport
     timing: Timing | None
-    """None if not asked for, or if the device could not be used."""
+    """None if no timing was requested, or if the device could not be used."""
 
     @property
     def findings(self) -> tuple[DeviceFinding, ...]:
-        """All findings: installation, device, then timing."""
+        """All findings, in the order installation, device, timing."""
         timing = self.timing.findings if self.timing is not None else ()
         return (*self.installation, *self.device.findings, *timing)
 
     @property
     def sensed(self) -> bool:
-        """Whether nothing was found against the accelerometer."""
+        """Whether no finding about the accelerometer is bad."""
         return all(finding.fine for finding in self.findings if finding.name in NOT_NEEDED)
 
     @property
     def exit_code(self) -> ExitCode:
-        """Exit code of the worst finding: DEVICE if device or timing is wrong, beside any other finding. Warnings are
-        ignored."""
+        """Exit code: DEVICE if a finding about device or timing is wrong, else ERROR if one about the installation is,
+        else DONE. Warnings are ignored."""
         timing = self.timing.findings if self.timing is not None else ()
         if any(finding.wrong for finding in (*self.device.findings, *timing)):
             return ExitCode.DEVICE
@@ -64,8 +68,8 @@ class Examination:
 def examine_setup(
     device: str, data: Path, timing_s: float, terminal: Terminal | None, on_progress: Callable[[float], None]
 ) -> Examination:
-    """All findings, in real time. timing_s: 0 for no timing. A device that cannot be opened, or is lost, is a
-    finding, not an error."""
+    """Run all checks in real time. timing_s: duration of the timing (s), 0 for none; on_progress: as for
+    `check_timing`. A device that cannot be opened, or is lost, results in a finding, not an error."""
     installation = check_installation(data, terminal)
     report, timing = _examine_device(device, timing_s, on_progress)
     return Examination(installation, report, timing)
@@ -74,6 +78,7 @@ def examine_setup(
 def _examine_device(
     name: str, timing_s: float, on_progress: Callable[[float], None]
 ) -> tuple[DeviceReport, Timing | None]:
+    """Findings about the device and its timing; a device with a wrong finding of its driver is not opened."""
     clock, settings = RealClock(), _settings(name, timing_s)
     driver = examine_device(name)
     report = DeviceReport(name, simulated=False, findings=driver)
@@ -94,10 +99,11 @@ def _examine_device(
 
 
 def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
+    """Measure the timing for `seconds`, and compare it with a bare loop that runs at the same time."""
     load, simulated = load_per_processor(), device.info.simulated
     with run_bare_loop_beside(seconds, device.info.sample_rate_hz, raised_priority=not simulated) as run:
         timing = check_timing(device, clock, seconds, on_progress, load)
-    # A simulated device's own loop is never late: there, the wake-ups of this program are compared.
+    # The loop of a simulated device is never late: for such a device, the wake-ups of this program are compared.
     late, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks
     if simulated:
         ticks = round(seconds * device.info.sample_rate_hz)
@@ -107,7 +113,8 @@ def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[f
 
 
 def _settings(name: str, timing_s: float) -> DeviceSettings:
-    """Settings of a study, but without the centring spring: nothing may move while the loop is timed."""
+    """Settings of a study without the centring spring, because nothing may move during the timing. timing_s: duration
+    (s) that a hold must permit."""
     settings = device_settings(read_study_protocol(PROTOCOL).protocol)
     longest_s = max(settings.limits.longest_hold_s, timing_s + SPARE_S)
     limits = replace(settings.limits, longest_hold_s=longest_s)
@@ -116,8 +123,8 @@ def _settings(name: str, timing_s: float) -> DeviceSettings:
 
 
 def require_sensor(examination: Examination) -> None:
-    """Require an accelerometer for a daily check. Raises DeviceError where a daily check would record no
-    acceleration."""
+    """Require a working accelerometer, without which a daily check would record no acceleration. Raises DeviceError
+    otherwise."""
     if not examination.sensed:
         raise DeviceError(
             "The daily check did not begin",
@@ -128,8 +135,9 @@ def require_sensor(examination: Examination) -> None:
 
 
 def accept(name: str, examination: Examination, operator: str, moving: MotionCallbacks) -> str:
-    """Record the baseline of the daily checks and sign that the device may be held, after an examination with timing.
-    Without an accelerometer there is no baseline. Raises DeviceError, WrongUseError."""
+    """Record the baseline of the daily checks and the acceptance of the device for use with a hand, signed by
+    `operator`; returns a sentence about it. Without an accelerometer no baseline is recorded. Raises DeviceError
+    without a timing or with a wrong finding, WrongUseError for a simulated device."""
     if not needs_real_time(name):
         raise WrongUseError("There is nothing to accept", f"{name!r} moves no hand.", "Leave --accept out.")
     timing = examination.timing

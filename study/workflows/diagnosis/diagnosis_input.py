@@ -1,4 +1,8 @@
-"""Input of a diagnosis: recordings or a session's trials, and the model to compare with."""
+"""Read the input of a diagnosis: recordings or the trials of a session, and the model to compare with.
+
+Recordings are checked for consistent channels, units and rates, converted to forces where a force constant is given,
+and brought into the form in which they can be compared. Refusals of the analysis become StudyErrors.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +19,7 @@ from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.workflows.recording.read_any_recording import read_any_recording
 
 Checked = TypeVar("Checked")
+"""Type of the result of a checked call."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,29 +28,32 @@ class DiagnosisInput:
 
     recordings: tuple[Recording, ...]
     names: tuple[str, ...]
+    """Names of the sources, for messages and reports."""
     parents: tuple[Path, ...]
     """Input files."""
     remarks: tuple[str, ...]
+    """Sentences on what was changed or noticed while reading."""
     simulated: bool = False
-    """A session on the simulated omega.3."""
+    """Whether the recordings are a session on the simulated omega.3."""
     spring_n_per_m: float = 0.0
-    """Stiffness of the virtual spring that held the handle and is not part of the commands (sessions only)."""
+    """Stiffness of the virtual spring that held the handle, whose force is not part of the commands (sessions only)."""
     constants: tuple[float, ...] = ()
-    """Stated force constants."""
+    """Force constants that were given, in N or N m per unit of the command; see `with_force_constant`."""
 
 
 def read_input(
     sources: Sequence[Path], seed: int, plain: bool = False, constants: tuple[float, ...] = ()
 ) -> DiagnosisInput:
-    """Read recordings, or one session's folder. plain: in the form in which forces can be balanced, see
-    `one_motion_per_force`. constants: see `with_force_constant`. Raises StudyError."""
+    """Read recordings, or the folder of one session. seed: of the choice among a session's trials. plain: convert to
+    one motion per force, as a force balance needs (`one_motion_per_force`). constants: see `with_force_constant`.
+    Raises StudyError."""
     folders = [source for source in sources if source.is_dir()]
     if folders and len(sources) > 1:
         raise not_diagnosable_error(
             (f"{folders[0]} is a folder: a session is diagnosed by itself",), "Give recordings, or one session."
         )
     if folders:
-        # Imported here: what reads sessions takes long to import.
+        # Imported here, because the modules that read sessions take long to import.
         from study.workflows.diagnosis.session_as_recordings import session_recordings
         from study.workflows.diagnosis.session_references import find_references
 
@@ -69,7 +77,7 @@ def read_input(
 
 
 def _translate_refusal(checked: Callable[[], Checked]) -> Checked:
-    """The result of `checked`; its refusal becomes a StudyError."""
+    """The result of the function `checked`. Raises StudyError where the function raises NothingToDiagnose."""
     try:
         return checked()
     except NothingToDiagnose as refusal:
@@ -79,7 +87,7 @@ def _translate_refusal(checked: Callable[[], Checked]) -> Checked:
 def _as_forces(
     recordings: tuple[Recording, ...], constants: Sequence[float]
 ) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """The recordings with commands as forces, and remarks. Raises WrongUseError."""
+    """The recordings with commands converted to forces, and remarks. Raises WrongUseError for a wrong constant."""
     if not constants:
         return recordings, ()
     from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
@@ -96,6 +104,7 @@ def _as_forces(
 
 
 def _notes(taken: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...]:
+    """Remarks on the import of all recordings, each only once."""
     return tuple(dict.fromkeys(note for _, notes in taken for note in notes))
 
 
@@ -123,11 +132,12 @@ def not_diagnosable_error(problems: Sequence[str], do_now: str = "Correct them, 
 
 
 def _sentences(problems: Sequence[str]) -> str:
+    """Problems as sentences, each with a capital and a full stop."""
     return " ".join(f"{begin_sentence(problem).rstrip('.')}." for problem in problems)
 
 
 def _names(sources: Sequence[Path]) -> tuple[str, ...]:
-    """File names; with their folders where these are not unique."""
+    """File names; with folder and number where two files have the same name."""
     names = tuple(source.name for source in sources)
     if len(set(names)) == len(names):
         return names

@@ -1,4 +1,9 @@
-"""Discovered laws saved as Python files, which a later diagnosis considers beside the catalogue."""
+"""Saves discovered laws as Python files (effect files) and loads them, as candidates of a later diagnosis.
+
+A diagnosis compares a catalogue of known physical effects, and may discover a formula without a name. Saved under a
+name, the formula joins the catalogue's effects in diagnoses of other recordings. Loading a file runs its code: load
+only files from a trusted source.
+"""
 
 import importlib.util
 import re
@@ -14,7 +19,7 @@ from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
-"""Name of an effect and of its file."""
+"""Valid name of an effect, and of its file without `.py`."""
 TEXT = """\"\"\"{about}\"\"\"
 
 from equalizer.effects.law_entry import LawEntry
@@ -35,12 +40,12 @@ ENTRY = LawEntry(
     signature={signature!r},
 )
 """
-"""Text of an effect's file; the values are filled in."""
+"""Template of an effect file, filled in by `write_entry`."""
 
 
 def write_entry(found: Path, out: Path, number: int = 1) -> LawEntry:
-    """Write a law of a diagnosis or model as a file. number: which law, from 1. Raises StudyError if there is none,
-    or if the file's name is not a valid name."""
+    """Write a law of a diagnosis (folder or JSON) or of a model (TOML) as an effect file. number: which law, from 1.
+    Raises StudyError if there is no such law, or if the name of `out` is not a new valid name."""
     laws = _laws(found)
     if number > len(laws):
         has = f"holds {len(laws)} law{'s' if len(laws) > 1 else ''}" if laws else "holds no discovered law"
@@ -65,7 +70,8 @@ def write_entry(found: Path, out: Path, number: int = 1) -> LawEntry:
 
 
 def read_entry(path: Path) -> LawEntry:
-    """Load an effect file by running it. Raises StudyError if it defines no ENTRY."""
+    """Load an effect file by running it. Raises StudyError if it does not exist, fails, or defines no ENTRY with a new
+    valid name."""
     spec = importlib.util.spec_from_file_location(f"hapteq_effect_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():
         raise _refusal(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
@@ -84,6 +90,7 @@ def read_entry(path: Path) -> LawEntry:
 
 
 def _laws(found: Path) -> list[Law]:
+    """Discovered laws of a diagnosis (effects first, then candidates) or of a model file, in their order."""
     if found.suffix == ".toml":
         return [effect.law for effect in read_mechanical_model(found).effects if effect.law is not None]
     document: Diagnosis = read_diagnosis(found / "diagnosis.json" if found.is_dir() else found)
@@ -92,4 +99,5 @@ def _laws(found: Path) -> list[Law]:
 
 
 def _refusal(happened: str, do: str) -> StudyError:
+    """Error with what happened and what to do."""
     return StudyError("There is no effect of your own", happened, do, saved="Nothing was written.")

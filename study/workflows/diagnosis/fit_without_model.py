@@ -1,4 +1,7 @@
-"""First model for a diagnosis without a given one; refusals become errors that a person can act on."""
+"""First mechanical model for a diagnosis to which no model was given, fitted to the recordings themselves.
+
+A refusal of the fit becomes a StudyError that names a remedy.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,8 +22,8 @@ GIVE_A_MODEL = "Give a model of the device alone with --model, or a recording th
 def first_model_of(
     found: DiagnosisInput, without: Sequence[str], bounds: tuple[TimeBudget, Guard], on_progress: Progress
 ) -> FirstModel:
-    """Fit a first model by force balance; if the balance crashes, to spectra. bounds: remaining time, and the guard
-    that catches crashes. Raises StudyError."""
+    """Fit a first model by force balance or, if that crashes, to spectra. without: names of effects that are left out.
+    bounds: remaining time, and the guard that catches crashes. Raises StudyError for unsuitable recordings."""
     time_left, guard = bounds
 
     def fit_by_balance() -> FirstModel | None:
@@ -42,6 +45,7 @@ def fit_linear_model(
 
 @contextmanager
 def _translate_refusals() -> Iterator[None]:
+    """Turn `NothingToDiagnose` into a StudyError with the same problems and a remedy."""
     try:
         yield
     except NothingToDiagnose as refusal:

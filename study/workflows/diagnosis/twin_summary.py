@@ -1,4 +1,8 @@
-"""Summary of `hapteq twin`: parameters of the model, and its prediction error."""
+"""Summary of `hapteq twin`, which writes the nominal mechanical model of a device: its parameters and prediction error.
+
+The same figures as lines for the terminal and as plain values for JSON. Errors are relative (rms over that of the
+channel).
+"""
 
 from dataclasses import asdict
 from typing import Any
@@ -12,7 +16,7 @@ from study.workflows.diagnosis.write_twin import WrittenTwin
 
 
 def twin_summary(written: WrittenTwin) -> dict[str, Any]:
-    """The written twin as plain values, for one JSON document."""
+    """The written model as plain values, for one JSON document."""
     model, fit, tolerance = written.model, written.fit, written.model.tolerance
     return {
         "model": str(written.plan.out),

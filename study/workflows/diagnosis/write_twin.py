@@ -1,5 +1,10 @@
-"""Nominal mechanical model of a device, as a laboratory would make it: excite well above friction, fit, subtract the
-damping equivalent of friction, add tolerances."""
+"""Identification of a device's nominal mechanical model (digital twin) from recordings made for this purpose.
+
+Steps: record multisines at two amplitudes well above friction; fit masses, dampings, stiffnesses and modes to the
+stronger recording; estimate the equivalent viscous damping of dry friction from the increase of damping at the lower
+amplitude (`rigid_body`) and subtract it; add tolerances, and the linkage's inertia if a calibration is given; write the
+model with its provenance.
+"""
 
 import math
 import tempfile
@@ -32,50 +37,53 @@ from study.workflows.free_name import require_free
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
 TITLE = "The model was not made"
-"""Title of each error of this command."""
+"""Title of the errors of this workflow."""
 STANDARD_GRAVITY = 9.80665
 """m/s², exact by definition."""
 SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)
-"""ADXL335 by its data sheet, with the capacitors of its board."""
+"""Bandwidth (Hz) and range (m/s²) of the accelerometer ADXL335, by its data sheet; the bandwidth follows from the
+filter capacitors of its board."""
 ACTUATOR = ActuatorLimits(bandwidth_hz=600.0)
-"""Typical bandwidth of current loops."""
+"""Assumed bandwidth (Hz) of the motors' current loops; typical, not measured."""
 LOWER_LEVEL = 0.6
-"""Second level relative to the protocol's: damping that grows at lower force is friction."""
+"""Amplitude of the second recording relative to the first: the equivalent viscous damping of dry friction is inversely
+proportional to the amplitude of motion, true viscous damping does not depend on it."""
 
 
 @dataclass(frozen=True, slots=True)
 class TwinPlan:
-    """Order of `write_twin`: model file to write, device to record, recording protocol, band, calibration."""
+    """Arguments of `write_twin`: model file to write, device to record, recording protocol, band, calibration."""
 
     out: Path
     device: str = "simulated"
     seed: int = 1
     protocol: str = "multisine"
-    """Multisines along every axis: a shipped recording protocol's name, or a file."""
+    """Recording protocol with multisines along x, y and z: name of a shipped protocol, or a file."""
     band_hz: tuple[float, float] = (3.0, 60.0)
-    """The study's frequencies with a margin; higher modes would cost time in each simulation."""
+    """Fitted band: the study's frequencies with a margin. Modes above it would slow down every simulation."""
     calibration: Path | None = None
-    """Calibration of the device's linkage. The simulated device takes its linkage and masses; the model says how the
-    inertia changes along each axis."""
+    """Calibration of the device's linkage, if any. The model then states how the inertia changes along each axis; a
+    simulated device is given the calibration's linkage and masses."""
 
     @property
     def recorded(self) -> str:
-        """The name under which the device is opened."""
+        """Name under which the device is opened."""
         as_calibrated = self.calibration is not None and self.device == SIMULATED
         return f"{CALIBRATED}{self.calibration}" if as_calibrated else self.device
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrittenTwin:
-    """A mechanical model that was identified from recordings of a device and written, and the fit it comes from."""
+    """A written mechanical model of a device, and the fits from which it was made."""
 
     plan: TwinPlan
     model: MechanicalModel
     """The model as written."""
     fit: MechanicalFit
     piece: RigidBody
+    """The fit as a rigid body at low frequencies, with the damping that is due to friction."""
     notes: tuple[str, ...]
-    """Sentences: assumptions, effect of friction."""
+    """Sentences on assumptions and on the effect of friction."""
 
 
 def write_twin(
@@ -83,8 +91,8 @@ def write_twin(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenTwin:
-    """Record, fit and write. `on_progress(share)`; before_moving as for `record_device`. Raises StudyError; no model
-    is written then."""
+    """Record, fit and write the model. on_progress: called with the share done, 0 to 1. before_moving: as for
+    `record_device`. Raises StudyError, and then writes no model."""
     check_free(plan)
     calibration = None if plan.calibration is None else read_calibration(plan.calibration)
     protocol = read_recording_protocol(plan.protocol).protocol
@@ -118,7 +126,7 @@ def write_twin(
 def _fit(
     plan: TwinPlan, strong: Recording, weaker: Recording, on_progress: Callable[[float], None]
 ) -> tuple[MechanicalFit, RigidBody]:
-    """Raises StudyError."""
+    """Fit of the whole band, and rigid-body fit of both recordings. Raises StudyError where a fit is refused."""
     settings = MechanicalFitSettings(
         band_hz=plan.band_hz, sensor=SENSOR, actuator=ACTUATOR, joint=True, fit_delay=False
     )
@@ -135,7 +143,7 @@ def _fit(
 
 
 def check_free(plan: TwinPlan) -> None:
-    """Check the output path before anything moves. Raises StudyError."""
+    """Check the output path and the band, before anything moves. Raises StudyError."""
     require_free(plan.out, title=TITLE, kind="models", saved="Nothing moved and nothing was written.")
     low, high = plan.band_hz
     if not (math.isfinite(low) and math.isfinite(high) and 0 < low < high):
@@ -148,6 +156,7 @@ def check_free(plan: TwinPlan) -> None:
 
 
 def _check_protocol(plan: TwinPlan, protocol: RecordingProtocol) -> None:
+    """Raise WrongUseError unless multisines drive x, y and z, which the masses and their coupling require."""
     driven = {segment.along for segment in protocol.segments if segment.kind == "multisine"}
     if not {"x", "y", "z"} <= driven and "all" not in driven:
         raise WrongUseError(
@@ -160,18 +169,21 @@ def _check_protocol(plan: TwinPlan, protocol: RecordingProtocol) -> None:
 
 
 def _reduce_amplitudes(protocol: RecordingProtocol) -> RecordingProtocol:
+    """The protocol with all amplitudes multiplied by `LOWER_LEVEL`."""
     segments = tuple(replace(segment, amplitude_n=LOWER_LEVEL * segment.amplitude_n) for segment in protocol.segments)
     return replace(protocol, segments=segments)
 
 
 def _record(plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving) -> Recording:
+    """Record by the plan and read the recording back. on_progress: share done, 0 to 1."""
     total = max(plan.total_s, 1e-9)
     record_device(plan, lambda seconds: on_progress(min(seconds / total, 1.0)), before_moving)
     return _last_realisation_tests(read_recording(plan.out))
 
 
 def _last_realisation_tests(recording: Recording) -> Recording:
-    """Mark the last realisation of every direction as test, where there are several."""
+    """Set the role of the last multisine realisation along each direction to "test", if there are several; else
+    "fit"."""
     facts: list[Mapping[str, Any]] = recording.meta["segments"]
     last: dict[str, int] = {}
     for fact in facts:
@@ -184,6 +196,7 @@ def _last_realisation_tests(recording: Recording) -> Recording:
 
 
 def _provenance(plan: TwinPlan, protocol: RecordingProtocol, strong: Recording, fit: MechanicalFit) -> dict[str, Any]:
+    """Origin of the model: software, seed, device, protocol, band and quality of the fit."""
     parents = () if plan.calibration is None else (plan.calibration,)
     return {
         **gather_provenance(seeds={"device": plan.seed}, parents=parents).as_dict(),
@@ -202,6 +215,7 @@ def _provenance(plan: TwinPlan, protocol: RecordingProtocol, strong: Recording, 
 
 
 def _notes(strong: Recording, fit: MechanicalFit, piece: RigidBody) -> tuple[str, ...]:
+    """Sentences for the user on the assumptions of the model and on the damping that was subtracted."""
     spring = strong.meta.get("feedback") or {}
     stiffness = float(spring.get("stiffness_n_per_m", 0.0))
     return (

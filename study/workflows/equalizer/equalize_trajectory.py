@@ -25,17 +25,18 @@ from study.workflows.equalizer.playback_models import PlaybackModels, Vector, pe
 from study.workflows.free_name import require_free
 
 HIGHEST_MPS2 = 1e4
-"""Largest accepted acceleration (m/s^2), a thousand times gravity: beyond it the table's unit is wrong."""
+"""Largest accepted acceleration (m/s^2), a thousand times gravity: larger values indicate a wrong unit in the table."""
 LARGEST_ERROR = 0.5
-"""Predicted error, relative to the wanted signal, above which forces are refused: half of it would be missed."""
+"""Predicted tracking error, relative to the wanted signal, above which forces are refused."""
 LEAST_WEIGHT_RATIO = 1e-7
-"""Ratio of the root of the force's weight to the model's gain below which the weight is lost in rounding."""
+"""Ratio of the root of the force's weight to the model's peak gain below which the weight is lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class EqualizePlan:
     """Request of an equalization: files of identified models, table of wanted accelerations, table of forces to write.
-    at_m: place in the workspace (m); constrain: keep the forces below the cap instead of refusing."""
+    at_m: place in the workspace (m). cap_n: largest force (N). constrain: keep the forces below the cap at the cost of
+    accuracy, instead of refusing."""
 
     models: tuple[Path, ...]
     trajectory: Path
@@ -51,12 +52,12 @@ class EqualizePlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EqualizedTrajectory:
-    """Forces computed for a wanted trajectory, and the models and solution they come from."""
+    """Forces computed for a wanted trajectory, with the models and the solution behind them."""
 
     plan: EqualizePlan
     wanted: Trajectory
     forces: Trajectory
-    """Total forces on the device, including a spring's share."""
+    """Forces to play in N, including those that compensate known effects."""
     models: PlaybackModels
     solved: Feedforward
     """Feedforward from the linear models alone."""

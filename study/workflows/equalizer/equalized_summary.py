@@ -1,4 +1,8 @@
-"""Summary of an equalized table, for a person's lines and a program's JSON."""
+"""Summary of `hapteq equalize`: how well the computed forces are expected to produce the wanted accelerations.
+
+The same figures as lines for the terminal and as plain values for JSON. Prediction errors are relative to
+the wanted signal (rms).
+"""
 
 from typing import Any
 
@@ -9,11 +13,11 @@ from equalizer.tracking.feedforward.feedforward import extract_band
 from study.workflows.equalizer.equalize_trajectory import EqualizedTrajectory
 
 WORTH_SAYING = 0.01
-"""Fraction of the wanted signal outside the band above which it is mentioned."""
+"""Fraction (rms) of the wanted signal, or of the forces, outside the band above which it is mentioned."""
 
 
 def summary(done: EqualizedTrajectory) -> dict[str, Any]:
-    """The figures as plain values."""
+    """The figures as plain values; units by the suffix of a key, errors as fractions."""
     solved, bands, compensation = done.solved, done.bands, done.compensation
     found: dict[str, Any] = {
         "forces": str(done.plan.out),
@@ -52,6 +56,7 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
 
 
 def _interpolation_facts(done: EqualizedTrajectory) -> dict[str, Any]:
+    """How the models were interpolated, and the errors of both methods at held-out places; empty without a choice."""
     choice = done.models.choice
     if choice is None:
         return {}
@@ -103,13 +108,14 @@ def _quality_lines(done: EqualizedTrajectory) -> list[str]:
 
 
 def predicted_error(done: EqualizedTrajectory) -> float:
-    """Relative error as the model predicts it; under an active cap, the one comparable with the error without cap
-    (corners included)."""
+    """Relative error as the model predicts it. Under an active cap it includes the corners of the capped forces, so
+    that it can be compared with the error without a cap."""
     loss = done.solved.loss
     return done.solved.error if loss is None else loss.error_capped
 
 
 def _prediction_line(done: EqualizedTrajectory) -> str:
+    """Predicted error, what the cap adds to it, and the highest force."""
     loss, (low, high) = done.solved.loss, done.models.band_hz
     who = "the model itself predicts" if len(done.models.given) == 1 else "the models themselves predict"
     cost = ""
@@ -125,12 +131,14 @@ def _prediction_line(done: EqualizedTrajectory) -> str:
 
 
 def _force_outside(done: EqualizedTrajectory) -> float:
+    """Fraction (rms) of the forces outside the model's band."""
     forces = done.forces.signal.samples
     outside = forces - extract_band(done.models.nearest, forces)
     return float(np.linalg.norm(outside) / np.linalg.norm(forces))
 
 
 def _band_lines(done: EqualizedTrajectory) -> list[str]:
+    """Edges and errors of the three bands; empty where a single band was solved for."""
     bands, two = done.bands, done.models.two
     if bands is None or two is None:
         return []
@@ -150,6 +158,7 @@ def _band_lines(done: EqualizedTrajectory) -> list[str]:
 
 
 def _physics_lines(done: EqualizedTrajectory) -> list[str]:
+    """Nonlinear effects that were compensated, and those that were not, with the reason."""
     compensation = done.compensation
     if compensation is None:
         return []
@@ -160,6 +169,7 @@ def _physics_lines(done: EqualizedTrajectory) -> list[str]:
 
 
 def _spring_line(done: EqualizedTrajectory) -> str:
+    """Whether the forces include those of a virtual spring, which depends on the model's input."""
     if done.models.nearest.provenance.get("input") == "excitation":
         return "These forces are for the device under the spring that it was recorded with."
     return "These forces are all that enters the device: a spring that holds the handle is not counted."

@@ -1,6 +1,6 @@
-"""docs/formats.md, docs/importing.md and docs/schemas/*.json, made from the code that reads and writes the files.
+"""Generates docs/formats.md, docs/importing.md and docs/schemas/*.json from the code that reads and writes the files.
 
-`python -m study.workflows.files.format_docs docs` writes them again; a test says when that is due.
+`python -m study.workflows.files.format_docs docs` updates them; a test fails if they differ from the code.
 """
 
 import json
@@ -39,7 +39,7 @@ from study.workflows.files.importing_docs import write_importing_page
 
 
 def event_schema() -> dict[str, Any]:
-    """JSON schema of a fact; each may carry the checksum that the log adds."""
+    """JSON schema of an event of the session log; each may have the checksum field `chain` that the log adds."""
     schema = EVENTS.json_schema()
     for event in schema["$defs"].values():
         if "event" in event.get("properties", {}):
@@ -48,7 +48,7 @@ def event_schema() -> dict[str, Any]:
 
 
 def session_log_markdown() -> Iterable[str]:
-    """Paragraphs on the session log and its seal."""
+    """Paragraphs of docs/formats.md on the session log and its seal."""
     yield "## Session log (`events.jsonl`) and its seal (`seal.json`)"
     yield (
         "One JSON object per line, appended and never changed; each is a fact of the schema `session_event.json`. "
@@ -101,7 +101,7 @@ LAWS = "\n\n".join(
 
 @dataclass(frozen=True, slots=True)
 class Schema:
-    """One file of docs/schemas."""
+    """A file of docs/schemas: its name, what it describes, and the function that generates its JSON schema."""
 
     file: str
     describes: str
@@ -109,7 +109,7 @@ class Schema:
 
 
 def document_schema(payload: Mapping[str, Any], format_name: str, version: int) -> dict[str, Any]:
-    """The schema of a whole JSON document, from the schema of what it holds beside format, version, provenance."""
+    """The schema of a whole JSON document: that of its own fields, with format, version and provenance added."""
     own = {"format": {"const": format_name}, "version": {"const": version}}
     return {
         **payload,
@@ -119,7 +119,7 @@ def document_schema(payload: Mapping[str, Any], format_name: str, version: int) 
 
 
 def request_schema() -> dict[str, Any]:
-    """One alternative for each kind of request."""
+    """JSON schema of a request to a running session, with one alternative for each kind of request."""
     schemas = {kind: TypeAdapter(asked).json_schema() for kind, asked in KINDS.items()}
     for kind, schema in schemas.items():
         schema["properties"]["request"] = {"const": kind}
@@ -171,7 +171,7 @@ SCHEMAS: tuple[Schema, ...] = (
         request_schema,
     ),
 )
-"""A new JSON format adds its schema here."""
+"""Schemas of all JSON formats and protocols. Each new JSON format must be added."""
 
 
 def formats_markdown() -> str:
@@ -204,13 +204,13 @@ def formats_markdown() -> str:
 
 
 def documents() -> dict[str, str]:
-    """Every generated file: its path under docs, and its text."""
+    """Text of every generated file, by its path below docs."""
     schemas = {f"schemas/{schema.file}": json.dumps(schema.make(), indent=2) + "\n" for schema in SCHEMAS}
     return {"formats.md": formats_markdown(), "importing.md": write_importing_page(), **schemas}
 
 
 def write_documents(folder: Path) -> None:
-    """Write docs/formats.md, docs/importing.md and the schemas. Raises CannotWriteError."""
+    """Write all generated files into this folder (docs), replacing older ones. Raises CannotWriteError."""
     for name, text in documents().items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         write_text(folder / name, text, overwrite=True)

@@ -1,4 +1,9 @@
-"""Import foreign recordings: by a map, by a table's own header, or as they are."""
+"""Import foreign recordings: files of other programs become a recording of hapteq.
+
+An import map states which columns are commands and responses, and their units. It is given, found with the files or
+among the shipped maps, or derived from the header of a table; recordings in hapteq's own format need none. The result
+records files, map and notes, so that its origin can be traced.
+"""
 
 import hashlib
 from collections.abc import Callable, Sequence
@@ -29,17 +34,17 @@ from study.store.formats.recording_layout import FORMAT
 from study.workflows.free_name import require_free
 
 Progress = Callable[[float], None]
-"""Called with the share that is done, 0 to 1."""
+"""Called with the share of the work that is done, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class ImportPlan:
-    """Foreign files, the map to a recording, and the output."""
+    """Files to import, the map to use, and the file to write."""
 
     files: tuple[Path, ...]
-    """Files, or one folder in which a map is searched for."""
+    """Files, or a single folder in which data and a map are searched."""
     map: str | None
-    """Name of a shipped map, or a path; None if headers suffice."""
+    """Name of a shipped map, or path of a map; None to find a map, or to derive one from headers."""
     out: Path
 
 
@@ -50,17 +55,19 @@ class Imported:
     path: Path
     recording: Recording
     map: str
-    """Name of the map; "header" or "recording" if there was none."""
+    """Name of the map; "header" if derived from one, "recording" for hapteq's own format."""
     notes: tuple[str, ...]
+    """What was assumed, changed or left out, as sentences."""
 
 
 def check_free(out: Path) -> None:
-    """Raise StudyError if the recording could not be written under this name."""
+    """Raise StudyError if `out` exists already, or its folder does not."""
     require_free(out, title="Nothing was imported", kind="recordings")
 
 
 def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: None) -> Imported:
-    """Import and write. on_progress: share done, 0 to 1. Raises StudyError; nothing is written then."""
+    """Import a recording and write it to `plan.out`, with the files' hashes and the map in its metadata. on_progress:
+    share done, 0 to 1. Raises StudyError; nothing is written then."""
     check_free(plan.out)
     read = read_foreign(plan.files, plan.map, on_progress)
     provenance = gather_provenance(parents=read.files).as_dict()
@@ -75,17 +82,19 @@ def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: Non
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Foreign:
-    """An imported recording that is not written yet."""
+    """An imported recording that is not written yet; see `Imported`."""
 
     recording: Recording
     files: tuple[Path, ...]
     map: str
     map_hash: str
+    """SHA-256 of the map's text; empty without a map."""
     notes: tuple[str, ...]
 
 
 def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progress = lambda share: None) -> Foreign:
-    """Import recordings into memory; nothing is written. Raises StudyError."""
+    """Import files into a single recording in memory; nothing is written. map_name: as `ImportPlan.map`. Raises
+    StudyError, and MapNeededError where no map is found and headers do not suffice."""
     if map_name is not None:
         source = read_map(map_name)
         return _import_by_map(source, _expand_folders(files, source.map), on_progress)
@@ -97,7 +106,8 @@ def read_foreign(files: Sequence[Path], map_name: str | None, on_progress: Progr
 
 
 def _expand_folders(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...]:
-    """The files; of a folder, those that the map applies to, without maps and notes."""
+    """The files, with a folder replaced by the files in it that the map applies to, except maps and notes. Raises
+    ImportRefusedError where none is left."""
     found: list[Path] = []
     for path in files:
         beside = sorted(path.iterdir()) if path.is_dir() else ()
@@ -111,12 +121,15 @@ def _expand_folders(files: Sequence[Path], wanted: ImportMap) -> tuple[Path, ...
 
 
 def _import_by_map(source: MapFile, files: Sequence[Path], on_progress: Progress) -> Foreign:
+    """Import files by a map; its hash becomes part of the result."""
     built = build_recording(source.map, files, on_progress)
     digest = hashlib.sha256(source.text.encode()).hexdigest()
     return Foreign(built.recording, tuple(files), source.name, digest, built.notes)
 
 
 def _import_by_found_map(folder: Path, on_progress: Progress) -> Foreign:
+    """Import a folder: by the only map that fits it, else by the files' headers. Raises WrongUseError where its maps
+    make several recordings."""
     found = find_map(folder)
     if len(found) == 1:
         return _import_by_map(found[0].source, found[0].files, on_progress)
@@ -134,6 +147,8 @@ def _import_by_found_map(folder: Path, on_progress: Progress) -> Foreign:
 
 
 def _read_own(files: Sequence[Path]) -> Foreign:
+    """Read recordings in hapteq's own format; several are joined one after another. Raises ImportRefusedError where
+    their device, sample rate or hold differ."""
     recordings = [read_recording(path) for path in files]
     if len(recordings) == 1:
         return Foreign(recordings[0], tuple(files), "recording", "", ())
@@ -151,6 +166,8 @@ def _read_own(files: Sequence[Path]) -> Foreign:
 
 
 def _import_by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
+    """Import files by the header of the first file, else by the only shipped map that fits them. Raises MapNeededError
+    with a draft of a map where neither suffices."""
     arrays = read_without_map(files[0])
     wanted = header_map(arrays)
     if wanted is None and (shipped := map_of_files(files)) is not None:
@@ -162,7 +179,8 @@ def _import_by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
 
 
 def _with_header(wanted: ImportMap, arrays: Arrays, files: Sequence[Path], on_progress: Progress) -> Foreign:
-    """arrays: of the first file. Raises MapNeededError, with all that is known, for what only a map can mend."""
+    """Import files by a map derived from headers. arrays: those of the first file. Raises MapNeededError, with a draft
+    of a map, for a problem that only a written map can solve."""
     try:
         built = build_recording(wanted, files, on_progress)
     except ImportRefusedError as refused:

@@ -1,4 +1,8 @@
-"""Inspect recordings before any model, and write a page about them."""
+"""Inspect recordings without a model (`hapteq look`): write a page with figures, lines of text, and a JSON document.
+
+The results (levels, driven bands, coherence, repeats, consistency checks) come from `analysis.look`; this
+module reads the files and writes the results.
+"""
 
 import json
 from collections.abc import Callable, Sequence
@@ -19,11 +23,12 @@ PAGE_NAME = "report.html"
 """Page about the recordings, in the folder of results."""
 
 Progress = Callable[[float], None]
-"""Called with the share that is done, 0 to 1."""
+"""Function that is called with the share of the work that is done, 0 to 1."""
 
 
 def look_at(paths: Sequence[Path], on_progress: Progress = lambda share: None) -> tuple[Overview, ...]:
-    """Overview of recordings, and of foreign tables with a complete header. Raises StudyError for other files."""
+    """Overviews of hapteq recordings, and of foreign files that can be imported without a map. Raises StudyError for
+    other files."""
     found = []
     for count, path in enumerate(paths, start=1):
         recording, notes = read_any_recording(path)
@@ -35,7 +40,8 @@ def look_at(paths: Sequence[Path], on_progress: Progress = lambda share: None) -
 
 
 def write_look(found: Sequence[Overview], folder: Path) -> Path:
-    """Write report.html and figures/ in `folder`; returns the page. Raises CannotWriteError."""
+    """Write report.html and figures/ in `folder`, replacing earlier files; returns the page's path. Raises
+    CannotWriteError."""
     pictures = pictures_of(found)
     write_pictures(folder / "figures", [picture for drawn in pictures for picture in drawn])
     provenance = {"recordings": ", ".join(each.name for each in found)}
@@ -44,7 +50,7 @@ def write_look(found: Sequence[Overview], folder: Path) -> Path:
 
 
 def list_recording_facts(found: Overview) -> tuple[str, ...]:
-    """Metadata of a recording, one line each."""
+    """Lines of text: device, duration, sample rate, hold of the commands, metadata, remarks of the import."""
     recording, meta = found.recording, found.recording.meta
     parts = len(found.stretches)
     rate = f"{recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, " if recording.is_timed else ""
@@ -60,11 +66,12 @@ def list_recording_facts(found: Overview) -> tuple[str, ...]:
 
 
 def look_document(found: Sequence[Overview]) -> list[dict[str, Any]]:
-    """One entry per recording, numbers in SI."""
+    """JSON document: one object per recording. sample_rate_hz is 1 where the time axis is unknown; see `Recording`."""
     return [_describe_recording_entry(each) for each in found]
 
 
 def _describe_recording_entry(each: Overview) -> dict[str, Any]:
+    """The results of one recording as plain values."""
     recording = each.recording
     return {
         "recording": each.name,
@@ -88,5 +95,5 @@ def _describe_recording_entry(each: Overview) -> dict[str, Any]:
 
 
 def _finite(entry: dict[str, Any]) -> dict[str, Any]:
-    """NaN becomes null, which JSON has."""
+    """The entry with None in place of NaN and infinity, which JSON does not have."""
     return {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in entry.items()}

@@ -1,4 +1,8 @@
-"""Play a recording protocol on the device, piece by piece, and write the result into one file."""
+"""Record a device: play all pieces of a recording protocol on it, and write commands and readings into one HDF5 file.
+
+Each piece is one excitation with a rest before and after it (`recording_pieces`). If the user interrupts or the device
+fails, the pieces that are complete are written.
+"""
 
 import contextlib
 from collections.abc import Callable
@@ -23,31 +27,32 @@ from study.workflows.recording.play_pieces import PlayedPiece, play_pieces
 from study.workflows.recording.take_facts import segment_facts, spring_facts, warnings_of
 
 NOMINAL_RATE_HZ = 1000.0
-"""Rate for which durations are stated before a device is open (Hz)."""
+"""Sample rate (Hz) with which durations are computed before a device is open."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordingPlan:
-    """What is recorded, on which device, at which place, and the output file."""
+    """Protocol, device, place of the handle and output file of a recording."""
 
     protocol: RecordingProtocol
     device: str
-    """Name as the command line takes it."""
+    """Name of the device, as on the command line."""
     place_m: tuple[float, float, float]
-    """Where the virtual spring holds the handle."""
+    """Equilibrium position of the virtual spring that holds the handle: x, y, z in m."""
     seed: int
-    """Of a simulated device's noise."""
+    """Seed of the random numbers of a simulated device."""
     out: Path
+    """File to write, which must not exist."""
 
     @property
     def total_s(self) -> float:
-        """Duration of all pieces once each (s), at the nominal rate, without repeats and pauses."""
+        """Duration (s) of all pieces, each played once, at the nominal rate, without repeats and pauses."""
         return sum(piece.commands.duration_s for piece in pieces(self.protocol, NOMINAL_RATE_HZ))
 
 
 @dataclass(frozen=True, slots=True)
 class WrittenRecording:
-    """File of a recording, and warnings about its pieces."""
+    """File of a recording, and warnings about its pieces as sentences."""
 
     path: Path
     warnings: tuple[str, ...]
@@ -58,12 +63,12 @@ def record_device(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
-    """Record the whole protocol. `on_progress(seconds)` counts recorded time, and steps back where something is
-    repeated. `before_moving(notice)` is called before a real device moves, with the notice for those around it; an
-    exception from it keeps the device still. Without one, a real device is refused.
+    """Record the whole protocol. `on_progress(seconds)` receives the recorded time, which decreases when a piece is
+    repeated. `before_moving(notice)` is called before a real device moves, with the notice for the people around it; an
+    exception from it keeps the device still. The default refuses every real device.
 
-    If interrupted (KeyboardInterrupt), the complete pieces are written, and UserInterruptError says so. Raises
-    StudyError before anything moves if `out` exists already.
+    Raises StudyError before anything moves if `out` exists already; UserInterruptError after KeyboardInterrupt, and
+    DeviceError if the device fails, both after the complete pieces were written.
     """
     check_free(plan.out)
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
@@ -77,8 +82,8 @@ def record_on(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenRecording:
-    """Record on an open device, whose settings are `make_recording_settings`; as `record_device`, but `out` is not
-    checked before. Complete pieces are written even where the device fails (DeviceError)."""
+    """Record on an open device, whose settings are those of `make_recording_settings`. Arguments and errors are as for
+    `record_device`, but `check_free` is left to the caller."""
     done: list[PlayedPiece] = []
     try:
         if not device.info.simulated:
@@ -97,11 +102,12 @@ def record_on(
 
 
 def check_free(out: Path) -> None:
-    """Raise StudyError if the recording could not be written under this name."""
+    """Raise StudyError if a file of this name exists, or its folder does not."""
     require_free(out, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
 def _make_interrupted_error(plan: RecordingPlan, done: int) -> UserInterruptError:
+    """Error after an interruption with the force released. done: number of complete pieces."""
     all_pieces = len(pieces(plan.protocol, NOMINAL_RATE_HZ))
     return UserInterruptError(
         "Interrupted",
@@ -112,22 +118,25 @@ def _make_interrupted_error(plan: RecordingPlan, done: int) -> UserInterruptErro
 
 
 def _force_left_error(plan: RecordingPlan, done: int) -> DeviceError:
+    """Error where the device may still exert a force. done: number of complete pieces."""
     return DeviceError(
         "The force may still be on", Fault.FORCE_LEFT.sentence, "Then record again.", saved=_describe_saved(plan, done)
     )
 
 
 def _describe_saved(plan: RecordingPlan, done: int) -> str:
+    """Sentence on what was written. done: number of complete pieces."""
     return f"The {done} whole pieces are in {plan.out}." if done else "Nothing was written."
 
 
 def _write_whole_pieces(plan: RecordingPlan, device: Device, done: list[PlayedPiece]) -> None:
+    """Write the complete pieces of an interrupted recording, if there are any."""
     if done:
         _write(plan, device, done, interrupted=True)
 
 
 def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
-    """Settings with which the device is opened for this recording."""
+    """Settings with which the device is opened: force limits, virtual spring, and place of the handle."""
     return DeviceSettings(
         limits=limits_of_recording(plan.protocol),
         spring_frequency_hz=plan.protocol.spring.natural_frequency_hz,
@@ -139,12 +148,14 @@ def make_recording_settings(plan: RecordingPlan) -> DeviceSettings:
 
 
 def _write(plan: RecordingPlan, device: Device, done: list[PlayedPiece], interrupted: bool) -> WrittenRecording:
+    """Join the pieces into one recording with a segment each, and write it."""
     parts = [replace(played.recording, segments=(played.piece.segment,)) for played in done]
     write_recording(plan.out, join(parts, _meta(plan, device, done, interrupted)))
     return WrittenRecording(plan.out, tuple(warning for played in done for warning in warnings_of(played)))
 
 
 def _meta(plan: RecordingPlan, device: Device, done: list[PlayedPiece], interrupted: bool) -> dict[str, Any]:
+    """Metadata of the recording's file: protocol, place, spring, facts on each segment, provenance."""
     protocol = plan.protocol
     return {
         "protocol": protocol.name,

@@ -1,6 +1,7 @@
-"""Read a session: fold its log, checking every line against its checksum and every level against the rules.
+"""Reads a session: applies the events of its log in order (a fold) and so rebuilds the session's state.
 
-Changes nothing. All readers of sessions start here, so that damage is always detected.
+Every line is checked against its checksum, every level against the rules of the protocol. Nothing on disk is changed.
+All readers of sessions start here, so that damage is always detected.
 """
 
 from dataclasses import dataclass
@@ -26,18 +27,18 @@ class FoldedSession:
     state: SessionState
     contents: LogContents
     sealed_lines: int
-    """Number of lines that a seal covers; 0 if there is none."""
+    """Number of lines of the log that a seal covers; 0 without a seal."""
 
     @property
     def seal_due(self) -> bool:
-        """Closed, but the program ended before the seal was written. A log without checksums is never sealed: its
-        content cannot be verified."""
+        """Whether the session is closed, but the program ended before the seal was written. A log without checksums is
+        never sealed, because its content cannot be verified."""
         return self.state.closed and bool(self.contents.chain.since) and not self.sealed_lines
 
 
 def fold_session(folder: SessionFolder) -> FoldedSession:
-    """Read a session without changing it. Raises StudyError where the log contradicts itself or the rules, and for a
-    withdrawn session."""
+    """Read a session without changing it. Raises StudyError where the log is damaged, belongs to another session or
+    contradicts the rules, and for a withdrawn session."""
     if folder.withdrawn:
         raise SessionWithdrawnError(folder)
     contents = read_log(folder.log)
@@ -75,8 +76,8 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
 
 
 def _check_end(state: SessionState, folder: SessionFolder) -> None:
-    """Raise if results show that the end of the log was lost: such a log otherwise looks like an interrupted
-    session."""
+    """Raise StudyError where the stored results cover more than the log, whose end was lost. Such a log otherwise looks
+    like that of an interrupted session."""
     closed, presentations = read_closed_and_presentations(read_summary(folder.path))
     if closed or presentations > len(state.trials):
         what = "a finished session" if closed else f"{presentations} presentations"
@@ -90,7 +91,8 @@ def _check_end(state: SessionState, folder: SessionFolder) -> None:
 
 
 def protocol_of(opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:
-    """The protocol inside a log. Raises StudyError if it cannot be read or does not match its hash."""
+    """The protocol stored in a log. Raises StudyError if it cannot be read, is not of a study, or does not match its
+    hash."""
     try:
         protocol = load_protocol(opened.protocol_text, f"the log of {folder.name}")
     except ProtocolError as problem:

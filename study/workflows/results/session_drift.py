@@ -1,4 +1,9 @@
-"""Drifts in a session, from the recordings of its probes, as sentences for the experimenter."""
+"""Drifts of the device and of the hand during a session, from the recordings of its probes, as sentences.
+
+A probe is a short periodic excitation between trials with the hand on the handle; a reference is a longer one with the
+handle free. Changes of friction, gain, delay, and of the hand's mass, damping and stiffness are estimated by
+`analysis.device_change.probe_drift`; this module reads the recordings and decides which are compared.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -15,7 +20,7 @@ from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import SessionFolder
 
 LIMITS = ChangeLimits()
-"""The daily check's limits."""
+"""Limits of the daily device check."""
 ALLOWED = {
     "friction": LIMITS.friction_n,
     "gain": LIMITS.share,
@@ -24,22 +29,26 @@ ALLOWED = {
     "damping": 3.0,
     "stiffness": 75.0,
 }
-"""Limits above which a threshold may move by more than the finest step of a staircase. Friction and gain as in the
-daily check; delay: one tick of the loop; hand: half of a light grip."""
+"""Changes above which a threshold may move by more than the finest step of a staircase: friction in N, relative gain,
+delay in s, and of the hand mass in kg, damping in N s/m, stiffness in N/m. Friction and gain as in the daily check;
+delay: one tick of the control loop; hand: about half of a light grip."""
 
 WITHOUT_HAND = ("friction", "gain", "delay")
-"""Quantities that references without a hand are compared by."""
+"""Quantities in which references, recorded without a hand, are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Read:
+    """Spectral lines from the recording of a probe or reference."""
+
     rate_hz: float
+    """Sample rate of the recording."""
     timed: tuple[TimedProbe, ...]
-    """Recordings: one of a probe; of a reference its two halves."""
+    """One element for a probe, two for a reference: its two halves."""
 
 
 class DriftReader:
-    """Caches what it has read: each update reads and compares new probes only."""
+    """Estimates the drifts of one session. Results are cached: each update reads and compares new probes only."""
 
     def __init__(self, folder: SessionFolder) -> None:
         self._folder = folder
@@ -49,7 +58,8 @@ class DriftReader:
         self._found: dict[str, tuple[DriftLine, ...]] = {}
 
     def look(self, probes: tuple[PlayedProbe, ...]) -> tuple[DriftLine, ...]:
-        """Present drifts: of device and hand together, in this sitting; of the device alone, between references."""
+        """The present drifts: of device and hand within the sitting, from probes; of the device alone over the session,
+        from references. probes: all probes of the session so far, in their order."""
         for probe in probes[self._seen :]:
             read = self._read_probe(probe)
             if read is not None and probe.kind in ("hand", "reference"):
@@ -59,8 +69,8 @@ class DriftReader:
         return tuple(line for lines in self._found.values() for line in lines)
 
     def _compare(self, newest: PlayedProbe) -> tuple[Drift, ...]:
-        """The newest one compared with earlier ones of its kind: probes with a hand with those of the sitting,
-        references with all."""
+        """The newest probe compared with earlier ones: a reference with the session's first reference, a probe with a
+        hand with those of the same sitting. Empty where there are too few."""
         if newest.kind == "reference":
             references = [read for probe, read in self._read if probe.kind == "reference"]
             first, last = references[0], references[-1]
@@ -69,8 +79,9 @@ class DriftReader:
         return drifts([timed for read in alike for timed in read.timed], _period(alike[-1]))
 
     def _drift_lines(self, kind: str, found: tuple[Drift, ...]) -> Iterator[DriftLine]:
+        """Drifts as lines for the experimenter, each with the time at which it was first found."""
         named = {(kind, drift.number, drift.axis): drift for drift in found}
-        # A drift that has disappeared has no beginning any more.
+        # A drift that has disappeared is forgotten: if it returns, its time is that of its return.
         self._since_s = {key: s for key, s in self._since_s.items() if key[0] != kind or key in named}
         for key, drift in named.items():
             since_s = self._since_s.setdefault(key, drift.at_s)
@@ -78,7 +89,7 @@ class DriftReader:
             yield DriftLine(since_s, f"without a hand, {words}" if kind == "reference" else words, is_beyond(drift))
 
     def _read_probe(self, probe: PlayedProbe) -> _Read | None:
-        """Read a probe's recording; None where nothing was kept, or it cannot be used."""
+        """Read a probe's recording; None where none was kept, or it cannot be used."""
         if not probe.recording or probe.trouble:
             return None
         try:
@@ -91,7 +102,7 @@ class DriftReader:
 
 
 def sentence(drift: Drift) -> str:
-    """ "friction along x 0.12 -> 0.20 N at minute 14"."""
+    """A drift in words with its unit and time, such as "friction along x 0.12 -> 0.20 N at minute 14"."""
     minute = f"at minute {drift.at_s / 60:.0f}"
     along = f" along {drift.axis}" if drift.axis else ""
     other = f" (or {' or '.join(drift.rivals)}: the probes cannot tell)" if drift.rivals else ""
@@ -106,7 +117,7 @@ def sentence(drift: Drift) -> str:
 
 
 def is_beyond(drift: Drift) -> bool:
-    """Whether it exceeds the limit of the session's analysis."""
+    """Whether the change exceeds its limit in `ALLOWED`."""
     return abs(drift.change) > ALLOWED[drift.number]
 
 
@@ -116,4 +127,5 @@ def _halves(recording: Recording) -> tuple[Recording, Recording]:
 
 
 def _period(read: _Read) -> int:
+    """Period of the probe's excitation in samples."""
     return round(PERIOD_S * read.rate_hz)

@@ -1,4 +1,8 @@
-"""Results derived from a session's log: its seal, tables, and a small report."""
+"""Results that are derived from a session's log: seal, tables of trials and thresholds, and summary.
+
+The log is the only source: each result can be computed from it again, and `result_problems` compares the files with
+what the log gives.
+"""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -30,17 +34,17 @@ REPORT_NAME = f"{ANALYSIS_NAME}/report.html"
 
 @dataclass(frozen=True, slots=True)
 class ResultProblem:
-    """A result that does not agree with the log."""
+    """A file of results that is missing, damaged, or does not agree with the log."""
 
     file: str
     missing: bool
     problems: tuple[str, ...]
-    """Without the file's name and a full stop."""
+    """Clauses without the name of the file and without a full stop."""
 
 
 def write_tables(folder: SessionFolder) -> SessionState:
-    """Write the seal of a closed session, trials.csv, thresholds.csv, detection.csv (for detection runs) and
-    session.json."""
+    """Write the seal of a closed session if it is due, trials.csv, thresholds.csv, detection.csv (for detection runs)
+    and session.json. Returns the state that the log gives. Raises StudyError."""
     folded = fold_session(folder)
     state = folded.state
     if folded.seal_due:
@@ -53,7 +57,8 @@ def write_tables(folder: SessionFolder) -> SessionState:
 
 
 def due_results(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
-    """Names of missing results of a closed session, because the program was killed before it wrote them."""
+    """Names of the results of a closed session that are missing or do not agree with the log, for example because the
+    program was killed before it wrote them. Empty for a session that is not closed."""
     if not folded.state.closed:
         return ()
     seal = (SEAL_NAME,) if folded.seal_due else ()
@@ -61,7 +66,7 @@ def due_results(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]
 
 
 def finish_tables(folder: SessionFolder, folded: FoldedSession) -> tuple[str, ...]:
-    """Write what is due, under the session's lock. Returns the names of these files. Raises StudyError."""
+    """Write all results under the session's lock if any is due. Returns the names of those due. Raises StudyError."""
     due = due_results(folder, folded)
     if due:
         with hold_session_lock(folder.path):
@@ -80,6 +85,7 @@ def result_problems(folder: SessionFolder, state: SessionState) -> tuple[ResultP
 
 
 def _compare(folder: SessionFolder, name: str, agrees: Callable[[Path], bool]) -> ResultProblem | None:
+    """The problem of one file; None where it can be read and `agrees` is true of its path."""
     path = folder.path / name
     if not path.exists():
         return ResultProblem(name, True, ("is missing",))
@@ -92,11 +98,12 @@ def _compare(folder: SessionFolder, name: str, agrees: Callable[[Path], bool]) -
 
 
 def _thresholds_agree(rows: tuple[Threshold, ...], path: Path) -> bool:
+    """Whether the file contains these thresholds."""
     return read_thresholds(path) == _as_in(path, rows, Threshold)
 
 
 def _as_in(path: Path, rows: tuple[Row, ...], row_type: type[Row]) -> tuple[Row, ...]:
-    """The rows with the columns of the table: an older version may lack some."""
+    """The rows as the file can state them: a column that a file of an older version lacks has its default."""
     return as_written_in(read_text(path), rows, row_type)
 
 
@@ -109,7 +116,7 @@ def _compute_tables(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
 
 
 def _summary_agrees(folder: SessionFolder, state: SessionState) -> bool:
-    """Agreement in the common keys: a later version may add some."""
+    """Whether the summary on the disk agrees with the log in all keys that both have; a later version may add keys."""
     written, due = read_summary(folder.path), _summary(state)
     if written is None or "session" not in written:
         return False
@@ -117,6 +124,7 @@ def _summary_agrees(folder: SessionFolder, state: SessionState) -> bool:
 
 
 def _summary(state: SessionState) -> dict[str, Any]:
+    """Content of session.json as JSON values, without format, version and provenance."""
     opened = state.opened
     return {
         "session": opened.session,
@@ -139,6 +147,7 @@ def _summary(state: SessionState) -> dict[str, Any]:
 
 
 def _write_summary(folder: SessionFolder, state: SessionState) -> None:
+    """Write session.json with its provenance: versions, hash of the protocol, seed, and the log as source."""
     provenance = gather_provenance(
         protocol_hash=state.opened.protocol_hash, seeds={"session": state.opened.seed}, parents=[folder.log]
     )

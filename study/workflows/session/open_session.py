@@ -1,4 +1,7 @@
-"""Begin a session: its folder, and a log whose first line fixes everything that follows."""
+"""Opening of a session: its folder, and a log whose first event states everything that determines the session.
+
+These are the protocol, seed, device, equalizer and software versions: an interrupted session is resumed from its log.
+"""
 
 import secrets
 from collections.abc import Iterator
@@ -24,7 +27,7 @@ from study.workflows.session.participant_number import participant_number
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """What is decided before the participant starts."""
+    """Decisions that are made before the participant starts."""
 
     protocol: StudyProtocol
     protocol_text: str
@@ -35,7 +38,7 @@ class SessionPlan:
     seed: int
     data: Path
     participant_number: int | None = None
-    """Place in a balanced order; None counts the participants in the data folder."""
+    """Place in a balanced order of conditions; None = counted from the participants in the data folder."""
     model: Path | None = None
     """Identified model that equalizes the stimuli; None where forces are commanded."""
 
@@ -50,13 +53,14 @@ class OpenedSession:
 
 
 def fresh_seed() -> int:
-    """A random seed."""
+    """A random seed of 32 bits, from the operating system."""
     return secrets.randbits(32)
 
 
 @contextmanager
 def open_session(plan: SessionPlan, device: DeviceInfo, equalized: Equalized, clock: Clock) -> Iterator[OpenedSession]:
-    """Create a session; it is locked while the context lasts."""
+    """Create a session: its folder, a copy of the model, and its log with the first event. The session is locked, and
+    the log open, while the context lasts."""
     number = plan.participant_number
     if number is None:
         number = participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)

@@ -1,4 +1,8 @@
-"""Preparation of each sitting: consent, exclusion, set-up, device and computer check."""
+"""Preparation of each sitting: consent, exclusion criteria, set-up, and the check of device and computer.
+
+The state decides which step is due (`next_preparation`) and each result is logged at once. A participant who refuses or
+is excluded leaves only that outcome.
+"""
 
 from dataclasses import replace
 
@@ -19,7 +23,8 @@ from study.workflows.trial.sitting import Sitting, record, write_notes
 
 
 def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState, str]:
-    """Run the preparation. Returns the state, and why the sitting ends before it began; empty if it continues."""
+    """Run all steps of the preparation that are due. Returns the new state, and the reason why the sitting ends before
+    the first trial; empty if it continues."""
     while (due := next_preparation(state)) is not None:
         match due:
             case Leave(reason=reason):
@@ -35,7 +40,8 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
 
 
 def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
-    """Ask for one form and log it."""
+    """Present a form, and log the outcome. A failed form must be confirmed, and is presented again if it is not. Raises
+    ValueError for the form on the handle, which is not logged as a form."""
     if form.kind is FormKind.HANDLE:
         raise ValueError("whether the handle is free is logged with the reference, not as a form")
     sitting.supervisor.begin("form")
@@ -44,7 +50,7 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
     if not outcome.passed:
         confirmation = confirmation_of(form, reply, words_of(state.protocol))
         if not is_confirmed(confirmation, sitting.display.fill_in(confirmation)):
-            # A slip of the finger is possible: the question is asked once more, and the second answer holds. The first
+            # The answer may have been a slip: the form is presented once more and the second answer counts. The first
             # is not stored.
             outcome = judge_form(state.protocol, form, sitting.display.fill_in(form))
     event = FormFilled(
@@ -63,14 +69,14 @@ def fill_in(state: SessionState, form: Form, sitting: Sitting) -> SessionState:
 
 
 def turn_away(state: SessionState, sitting: Sitting) -> SessionState:
-    """Close the session; only the outcome is logged."""
+    """Close the session of a participant who refused or was excluded; pending notes and the outcome are logged."""
     state = write_notes(state, sitting)
     outcome = state.sitting.turned_away or "refused"
     return record(state, SessionClosed(utc=sitting.clock.utc(), outcome=outcome), sitting)
 
 
 def does_not_take_part(state: SessionState) -> StudyError:
-    """The error at the end of such a sitting, and on an attempt to resume it."""
+    """The error at the end of the sitting of a person who refused or was excluded, and on an attempt to resume it."""
     return StudyError(
         "This person does not take part",
         f"{state.opened.session} is over: {TURNED_AWAY[state.sitting.turned_away or 'refused']}.",
@@ -80,12 +86,13 @@ def does_not_take_part(state: SessionState) -> StudyError:
 
 
 def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
-    """Repeat the check as long as the experimenter wants. Continuing despite a finding is logged."""
+    """Check device and computer once, and log the findings and whether the experimenter continues. The preparation
+    repeats the check until the experimenter does."""
     sitting.supervisor.begin("preparing")
     device, clock = sitting.device, sitting.clock
     safety = state.protocol.safety
     report = check_device(device, clock, sitting.place_m, safety.total_cap_n, safety)
-    # In virtual time no process waits for a processor.
+    # In virtual time the load of the computer has no effect.
     load = None if clock.virtual else load_per_processor()
     computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
     daily = () if device.info.simulated else (last_check(device.info, state.protocol.setup.daily_check_needed),)
@@ -96,6 +103,7 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
 
 
 def _finding_text(finding: DeviceFinding) -> str:
+    """Mark of a finding in the log: nothing if fine, else a warning or a fault."""
     if finding.fine:
         return ""
     return " (warning)" if finding.warning else " (not fine)"

@@ -1,5 +1,10 @@
-"""One trial: wait for the handle, log, play, ask, log, release, measure, log. Every fact is on the disk before the
-device moves."""
+"""One trial of a session, from the wait for the handle to the logged result.
+
+Order: wait until the handle rests at the centre; log the presentation; play the stimulus and ask; log the answer;
+release the force; measure the delivered acceleration and log it. A detection trial releases the force before the
+question. Each fact is on the disk before the program acts on
+it, so that a crash loses no trial and no answer.
+"""
 
 import math
 from collections.abc import Callable
@@ -25,11 +30,11 @@ from study.workflows.trial.sitting import Pulse, Sitting, record, release_device
 from study.workflows.trial.trial_facts import Outcome, answer_health, trial_measured, trial_presented, trial_spoiled
 
 NOT_MASKED = Unanswered("the masking noise stopped during the trial", leave=False)
-"""Reply in place of an answer given without masking noise: the trial is void."""
+"""Replaces an answer that was given without masking noise: the trial is void."""
 
 
 def question_of(state: SessionState, present: Present) -> Question:
-    """A due trial as the participant sees it, without anything that could reveal the answer."""
+    """A due trial as it is shown to the participant, without anything that could reveal the right answer."""
     run = state.runs[present.run]
     alike = [other.index for other in state.runs if (other.phase, other.practice) == (run.phase, run.practice)]
     return Question(
@@ -48,7 +53,8 @@ def question_of(state: SessionState, present: Present) -> Question:
 
 
 def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
-    """Wait for the handle. None when a trial may start; otherwise why the wait was cut short."""
+    """Wait until the handle has been within the protocol's gate for long enough. None when the trial may start;
+    otherwise why the wait ended early. Does not wait where the gate is off (radius 0)."""
     gate = state.protocol.gate
     if gate.radius_mm <= 0:
         return None
@@ -67,7 +73,8 @@ def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
 
 
 def _make_look(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[], HandleView]:
-    """Function that reads the handle and judges whether it has been inside the gate long enough."""
+    """Function that reads the handle's position and returns whether it has been inside the gate for `gate.still_s`,
+    with the instruction for the participant and the offset in the plane (mm)."""
     inside_since_s: list[float] = []
 
     def look() -> HandleView:
@@ -97,7 +104,7 @@ def _make_look(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[
 
 
 def present_trial(state: SessionState, present: Present, sitting: Sitting) -> AfterTrial:
-    """Run one trial to its result."""
+    """Run one trial: presentation, answer and measurement, or the reason why it is void. Everything is logged."""
     hindrance = await_handle(state, sitting)
     if hindrance is not None:
         return cut_short(state, hindrance)
@@ -126,7 +133,7 @@ def present_trial(state: SessionState, present: Present, sitting: Sitting) -> Af
 
 
 def _log_pulse(state: SessionState, present: Present, pulse: Pulse, sitting: Sitting) -> SessionState:
-    """Logged now and not at the onset: no write to the disk may fall between onset and question."""
+    """Log the onset pulse, after the answer: no write to the disk may delay the question after the onset."""
     fact = OnsetPulsed(
         utc=sitting.clock.utc(),
         run=present.run,
@@ -143,6 +150,8 @@ def _log_pulse(state: SessionState, present: Present, pulse: Pulse, sitting: Sit
 
 
 def _close(state: SessionState, present: Present, played: Played, asked: StimulusReply, sitting: Sitting) -> AfterTrial:
+    """Judge an answered trial by the health of device and loop, and log it as measured, flagged or spoiled. played: the
+    stimulus until its release."""
     correct = state.answered is not None and state.answered.answer == present.label
     vector = direction_vector(state.protocol.directions, present.direction)
     verdict = judge(played.health, state.protocol.measurement, asked.felt_whole, asked.health)
@@ -166,10 +175,11 @@ def _close(state: SessionState, present: Present, played: Played, asked: Stimulu
 def _void(
     state: SessionState, present: Present, asked: StimulusReply, reply: Unanswered, sitting: Sitting
 ) -> AfterTrial:
+    """Release the force, log a trial without a valid answer as spoiled, and return how the sitting continues."""
     played = release_device(sitting) if asked.holding else asked.played
     health = played.health if played is not None else None
     fault = health.fault if health is not None else Fault.NONE
-    # An emergency stop is a fault too, but the person who pressed it is more informative.
+    # An emergency stop is also a fault, but the reply names who pressed it, which is more informative.
     faulty = fault is not Fault.NONE and not reply.leave
     reason = fault.value if faulty else reply.reason
     cause = cause_of(fault) if faulty else _cause_of(reply, sitting)
@@ -185,6 +195,7 @@ def _void(
 
 
 def _cause_of(reply: Unanswered, sitting: Sitting) -> VoidCause:
+    """Why a trial without a fault of the device is void."""
     who = sitting.supervisor.stop_asked or sitting.supervisor.pause_asked
     if who is not None and who != "participant" and (reply.leave or reply.pause):
         return VoidCause.EXPERIMENTER

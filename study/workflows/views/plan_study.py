@@ -1,4 +1,9 @@
-"""The plan of each study in a data folder: who is planned, done and left out, and who comes next. Reads only."""
+"""The plan of each study in a data folder: planned, finished and excluded participants, and the order of frequencies
+that the next participant receives. Only reads files.
+
+A participant may have several sessions; the session with the most progress counts. The design is computed by
+`protocols.procedure.study_plan`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,35 +25,40 @@ from study.workflows.session.participant_number import participant_number, read_
 from study.workflows.views.session_line import session_line
 
 PROGRESS: dict[str, Progress] = {"finished": "done", "unfinished": "begun", "running": "begun"}
-"""Progress of a participant, by the standing of the best session; any other standing leaves out."""
+"""Progress of a participant, by the standing of the best session; with any other standing a participant is left out."""
 BEST_FIRST = ("finished", "running", "unfinished")
-"""Standings by which the best session of a participant is chosen."""
+"""Standings in the order in which the best session of a participant is chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedStudy:
-    """Plan of a study with the sessions begun so far, and the code of the next participant."""
+    """Plan of a study from the sessions begun so far, and the code of the next participant."""
 
     plan: StudyPlan
     next_code: str
-    """A free code in the style of the latest one."""
+    """An unused participant code in the style of the latest one."""
     remarks: tuple[str, ...]
+    """Warnings as sentences."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Begun:
+    """A session that a participant has begun."""
+
     folder: SessionFolder
     protocol: str
+    """Name of the protocol."""
     number: int | None
+    """Place of the participant in the balanced order; None where none was assigned."""
     line: SessionLine
     protocol_text: str | None
-    """None where it is not in the log: withdrawn or damaged."""
+    """Text of the protocol from the log; None where the log was withdrawn or is damaged."""
 
 
 def list_planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[PlannedStudy, ...]:
-    """The plans of studies in a data folder. protocol: a name or file; None = all that were begun in `data`. simulated:
-    of simulated participants instead of people, who are counted apart. Raises StudyError where there is nothing to
-    plan."""
+    """The plans of studies in a data folder. protocol: name or file of a protocol; None = all protocols with sessions
+    in `data`. simulated: plan for simulated participants, who are counted separately from people. Raises StudyError
+    where the protocol cannot be read, or there is no session."""
     begun = _find_begun(data, simulated)
     if protocol is not None:
         chosen = read_study_protocol(protocol, data).protocol
@@ -67,6 +77,7 @@ def list_planned_studies(data: Path, protocol: str | None, simulated: bool) -> t
 
 
 def _find_begun(data: Path, simulated: bool) -> list[_Begun]:
+    """All sessions of simulated participants, or of people, whose protocol is known."""
     found = []
     for folder in session_folders(data):
         begun = read_begun_participant(folder)
@@ -76,6 +87,7 @@ def _find_begun(data: Path, simulated: bool) -> list[_Begun]:
 
 
 def _protocol_text(folder: SessionFolder) -> str | None:
+    """Text of the protocol from a session's log; None where it cannot be read."""
     try:
         opening = read_opening(folder.log)
     except (StudyError, OSError, ValueError):
@@ -84,28 +96,30 @@ def _protocol_text(folder: SessionFolder) -> str | None:
 
 
 def _plan_from_sessions(data: Path, protocol: StudyProtocol, begun: Sequence[_Begun], simulated: bool) -> PlannedStudy:
+    """The plan of one study from its sessions."""
     people: dict[str, list[_Begun]] = {}
     for each in sorted(begun, key=_by_number):
         people.setdefault(each.folder.subject, []).append(each)
-    # As assigned to a new participant, whose code has no folder yet.
+    # The number that a new participant would receive: the empty code belongs to no session folder.
     number = participant_number(data, "", protocol.name, simulated)
     plan = plan_study(protocol, [_participant(code, sessions) for code, sessions in people.items()], number)
     return PlannedStudy(plan, _free_code(data, tuple(reversed(people))), _remarks(begun))
 
 
 def _free_code(data: Path, own: tuple[str, ...]) -> str:
-    """own: codes of this study, the latest first, whose manner is kept."""
+    """An unused code that continues those of this study. own: codes of this study, the latest first."""
     others = tuple(folder.subject for folder in session_folders(data))
     return next_code((*own, *others)) if own or "P01" in others else next_code(())
 
 
 def _by_number(each: _Begun) -> tuple[float, str]:
-    """Ordered by number, because the start of a withdrawn session is erased."""
+    """Sorting key of sessions: by number, then by name of the folder; those without a number last. The time of the
+    start cannot be used, because it is erased from a withdrawn session."""
     return (float("inf") if each.number is None else each.number, each.folder.name)
 
 
 def _participant(code: str, sessions: Sequence[_Begun]) -> Participant:
-    """Status of the session that is furthest."""
+    """The participant, with the progress of the best session."""
     standings = [each.line.standing for each in sessions]
     numbers = [each.number for each in sessions if each.number is not None]
     best = next((standing for standing in BEST_FIRST if standing in standings), standings[-1])
@@ -132,7 +146,8 @@ def _latest_protocol(name: str, begun: Sequence[_Begun]) -> StudyProtocol:
 
 
 def _remarks(begun: Sequence[_Begun]) -> tuple[str, ...]:
-    """Protocol texts that differ: orders of one would otherwise be counted with those of another."""
+    """Warning if sessions of this protocol used different texts of it: their orders would be counted together although
+    they may differ."""
     texts = {each.protocol_text for each in begun if each.protocol_text is not None}
     if len(texts) < 2:
         return ()
@@ -140,7 +155,7 @@ def _remarks(begun: Sequence[_Begun]) -> tuple[str, ...]:
 
 
 def document(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
-    """Values for a program."""
+    """Plans as values that can be written as JSON, for other programs."""
     return {
         "studies": [
             {
@@ -173,11 +188,13 @@ def document(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
 
 
 def _next_order(cell: Cell | None) -> dict[str, Any]:
+    """Order and labelling of the next participant; empty where nothing is balanced."""
     return {} if cell is None else {"frequencies_hz": list(cell.frequencies_hz), "swapped": cell.swapped}
 
 
 def lines(study: PlannedStudy) -> list[str]:
-    """Output for the terminal: sentences, and rows of cells below `orders`."""
+    """Lines of text for the terminal: progress, participants to resume or left out, cells that lack participants, next
+    participant, warnings."""
     plan = study.plan
     done, begun, out = (plan.count(each) for each in ("done", "begun", "left out"))
     size = f" of {plan.planned} planned" if plan.planned else ""
@@ -207,6 +224,7 @@ def _list_with_title(title: str, codes: Sequence[str]) -> list[str]:
 
 
 def _progress_text(plan: StudyPlan) -> str:
+    """Order of the next participant in words; empty where nothing is balanced."""
     cell = plan.next_cell
     if cell is None:
         return ""
@@ -214,7 +232,7 @@ def _progress_text(plan: StudyPlan) -> str:
 
 
 def order_words(cell: Cell) -> str:
-    """Order of runs in words, such as: 5, 45, 15, 35, 25 Hz, numbers swapped."""
+    """The order of a cell in words, such as "5, 45, 15, 35, 25 Hz, numbers swapped"."""
     hertz = ", ".join(f"{frequency:g}" for frequency in cell.frequencies_hz)
     words = f"{hertz} Hz" if hertz else "by lot"
     return f"{words}, numbers swapped" if cell.swapped else words

@@ -1,4 +1,7 @@
-"""Send a request to a running session and wait until it is received."""
+"""Send a request (stop, pause or note) to a running session in another process, and wait until it is received.
+
+A request is a file in the session's folder (`RequestInbox`); the session removes it when it takes the request.
+"""
 
 from study.devices.clock import Clock
 from study.errors import StudyError
@@ -8,15 +11,18 @@ from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 
 HEARD_WITHIN_S = 3.0
-"""A session checks about twenty times a second, except while a form or notice is shown."""
+"""Longest wait for the session (s). It checks its inbox about twenty times a second, except while a form or notice is
+shown."""
 POLL_EVERY_S = 0.02
-"""Interval at which the reply is looked for (s)."""
+"""Interval (s) at which it is checked whether the request was taken."""
 
 
 def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
-    """Returns whether the session received it; a note that is not received yet stays in the inbox.
+    """Send a request. Returns True if the session received it, False for a note that stays in the inbox.
 
-    Raises StudyError where nothing runs, or where a stop or pause was not received.
+    Raises StudyError if the session is not running, the request cannot be written, or a stop or pause was not received
+    in time. A stop then stays in the inbox; a pause is taken back. Where it is unknown whether the session is running
+    (no file locks), the request is sent.
     """
     if is_log_locked(folder.log) is False:
         raise StudyError(
@@ -35,6 +41,7 @@ def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
 
 
 def _unheard(folder: SessionFolder, request: Request, inbox: RequestInbox, name: str) -> bool:
+    """Handle a request that was not received in time; returns and raises as `send_request`."""
     if isinstance(request, NoteAsked):
         return False
     waits = f"{folder.name} took nothing within {HEARD_WITHIN_S:g} s: a form or a notice is being read, or it hangs."
@@ -45,7 +52,8 @@ def _unheard(folder: SessionFolder, request: Request, inbox: RequestInbox, name:
             "If the handle moves: hand off, and switch the device off.",
             saved="The stop waits for the session and is the first thing that it will hear.",
         )
-    # A pause that comes minutes later would surprise participant and experimenter.
+    # A pause that begins minutes later would surprise participant and experimenter. If it cannot be taken back, the
+    # session has taken it meanwhile.
     if not inbox.take_back(name):
         return True
     raise StudyError(

@@ -1,4 +1,7 @@
-"""Facts about a session: (name, value) in display order."""
+"""Facts about a session as text: pairs (name, value) in display order.
+
+They are taken from the session's verified log (`FoldedSession`). Empty values are left out.
+"""
 
 from equalizer.plant.model_quality import NOT_STORED
 from study.session.facts.events import FormFilled, SessionClosed, SessionOpened, SessionResumed, TrialSpoiled
@@ -12,12 +15,12 @@ _HASH_DIGITS = 12
 
 
 def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], ...]:
-    """The facts. zone: of the displayed times."""
+    """Pairs (name, value) in display order. zone: time zone of the displayed times."""
     state, events = folded.state, folded.contents.events
     opened = state.opened
     who = f"simulated ({opened.observer})" if opened.observer else "a person"
     lock = "locked" if opened.protocol_locked else "not locked"
-    # Nothing waits for a simulated participant, so the log may end in the future.
+    # A simulated participant runs faster than real time, so that the log may end in the future.
     ahead = ", in simulated time, which runs ahead of the clock" if opened.observer else ""
     facts = [
         ("participant", f"{opened.subject}, {who}, {_number(state)}"),
@@ -41,24 +44,26 @@ def session_facts(folded: FoldedSession, zone: Zone) -> tuple[tuple[str, str], .
 
 
 def _end_text(state: SessionState) -> str:
+    """Name of the time of the log's end: a participant turned away, a finished session, or one under way."""
     if state.sitting.turned_away:
         return "ended"
     return "finished" if state.closed else "last entry"
 
 
 def _number(state: SessionState) -> str:
+    """The participant's place in the counterbalanced order of the protocol, from 1."""
     if not state.takes_part:
         return "without a place in the order of this protocol"
     return f"number {state.opened.participant_number + 1} of this protocol"
 
 
 def _quality(opened: SessionOpened) -> str:
-    """Quality of the model that equalizes the stimuli."""
+    """Quality of the model that equalizes the stimuli; empty without an equalizer."""
     return "" if opened.equalized is None else opened.equalized.quality or NOT_STORED
 
 
 def _reach_text(opened: SessionOpened) -> str:
-    """Acceleration that both directions reach at the cap."""
+    """Acceleration (m/s²) that both directions reach at the force cap, by frequency; empty without an equalizer."""
     if opened.equalized is None:
         return ""
     return ", ".join(f"{s.reachable_mps2:.1f} m/s² at {s.frequency_hz:g} Hz" for s in opened.equalized.levels)
@@ -71,6 +76,7 @@ def _device(opened: SessionOpened) -> str:
 
 
 def _answers(folded: FoldedSession) -> str:
+    """Number of answers and of void presentations; a presentation that still waits for its answer is not void."""
     state = folded.state
     void = len(state.trials) - state.answers - (state.presented is not None and state.answered is None)
     if not void:
@@ -82,19 +88,20 @@ def _answers(folded: FoldedSession) -> str:
 
 
 def _last_utc(folded: FoldedSession) -> str:
+    """UTC time of the session's end, or else of the last event."""
     closed = next((event.utc for event in folded.contents.events if isinstance(event, SessionClosed)), "")
     return closed or folded.contents.events[-1].utc
 
 
 def _log(folded: FoldedSession) -> str:
-    """Evidence that the log is unchanged: checksums and seals."""
+    """Number of lines of the log, and the evidence that it is unchanged: checksums and seals."""
     lines = f"{folded.contents.chain.lines} lines"
     sealed = f", sealed to line {folded.sealed_lines}" if folded.sealed_lines else ""
     return f"{lines}, {folded.contents.chain.in_words()}{sealed}"
 
 
 def _forms(folded: FoldedSession) -> tuple[tuple[str, str], ...]:
-    """Answers to questions; free text stays in the log file, because it may concern health."""
+    """Consent and answers to questions. Free text is not shown, because it may concern health."""
     protocol = folded.state.protocol
     asked = {"questionnaire": protocol.before, "debrief": protocol.debrief}
     facts = []

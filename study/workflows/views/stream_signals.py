@@ -1,5 +1,8 @@
-"""What a running session's device does, tick by tick, as signals beside its markers: from the loop's telemetry ring, by
-a program of its own, while a trial runs."""
+"""Streams of the signals of a running session's device over the lab streaming layer (LSL): force, acceleration, motion
+and status of the loop at every tick, in addition to the session's markers.
+
+They are read from the loop's telemetry ring by a separate program, so that streaming never delays the loop.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,10 +20,11 @@ if TYPE_CHECKING:
     from study.devices.telemetry import TelemetryReader
 
 LOOK_EVERY = 10
-"""Calls between two looks whether the session runs on another ring (a resumed one does)."""
+"""Calls of `push` between two checks whether the session uses another ring, as a resumed session does."""
 
 
 def _three(name: str) -> tuple[str, str, str]:
+    """Channel names of the components of a vector."""
     return (f"{name}_x", f"{name}_y", f"{name}_z")
 
 
@@ -30,11 +34,12 @@ STREAMS = (
     StreamDescription("hapteq motion", "Motion", (*_three("position"), *_three("velocity")), ("m",) * 3 + ("m/s",) * 3),
     StreamDescription("hapteq loop", "Status", ("tick", "phase", "fault", "missed_ticks"), ("",) * 4),
 )
-"""The streams, in the order of the signals that are sent; in each, the channels and their units."""
+"""Name, kind, channels and units of each stream, in the order in which `_push_new` sends the signals."""
 
 
 class SignalStreams:
-    """folder: of the session. open_outlet(stream, rate_hz): called when a loop is there for the first time."""
+    """Sends the telemetry of a session's device to LSL outlets. folder: of the session. open_outlet(stream, rate_hz):
+    called for each stream when a ring is found for the first time."""
 
     def __init__(self, folder: Path, open_outlet: Callable[[StreamDescription, float], SignalOutlet]) -> None:
         self._folder = folder
@@ -43,10 +48,11 @@ class SignalStreams:
         self._reader: TelemetryReader | None = None
         self._outlets: tuple[SignalOutlet, ...] = ()
         self.sent = 0
-        """Ticks."""
+        """Number of ticks sent so far."""
 
     def push(self, offset_s: float) -> int:
-        """Send the ticks since the last call; offset_s: LSL's clock less the session's. How many ticks were lost."""
+        """Send the ticks since the last call. offset_s: LSL's clock minus the session's, s. Returns the number of ticks
+        that were overwritten in the ring before they could be read."""
         lost = self._push_new(offset_s)
         if self._calls % LOOK_EVERY == 0:
             self._push_new_rows()
@@ -54,18 +60,20 @@ class SignalStreams:
         return lost
 
     def _push_new_rows(self) -> None:
+        """Change to the session's present ring, and open the outlets when a ring is found for the first time."""
         live = read_live(self._folder)
         if live is None or live.telemetry == self._path:
             return
         self._path = live.telemetry
         try:
             self._reader = telemetry_of(self._path) if self._path else None
-        except StudyError:  # that sitting is over; the next one has another ring
+        except StudyError:  # this sitting has ended; the next sitting has another ring
             self._reader = None
         if self._reader is not None and not self._outlets:
             self._outlets = tuple(self._open_outlet(stream, self._reader.rate_hz) for stream in STREAMS)
 
     def _push_new(self, offset_s: float) -> int:
+        """Send the rows that the ring has gained; returns the number of rows that were lost."""
         if self._reader is None:
             return 0
         lost_before = self._reader.lost

@@ -1,4 +1,8 @@
-"""Write a note into a session's log: through the session while it runs, directly otherwise."""
+"""Write an experimenter's or participant's note into the log of a session.
+
+A log has a single writer. While a session runs, its own program is that writer, and the note is sent to it; otherwise
+the note is appended directly, under the session's lock.
+"""
 
 from study.devices.clock import Clock
 from study.errors import StudyError
@@ -15,9 +19,10 @@ from study.workflows.views.send_request import send_request
 
 
 def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
-    """Returns whether it is in the log or received by the running session; False if it waits in the inbox.
+    """Write a note. Returns whether the log holds it or the running session received it; False = waiting in the inbox.
 
-    Raises StudyError where the log cannot be written.
+    An incomplete last line of the log is removed first, and a closed session is sealed again. Raises StudyError for an
+    empty text or one that is not UTF-8, and where the log cannot be read or written.
     """
     if not note.text.strip():
         raise StudyError("There is nothing to note", "The text is empty.", "Give a sentence.")
@@ -47,5 +52,5 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
 
 
 def _of_the_program(text: str, clock: Clock) -> NoteTaken:
-    """Note about a repaired last line, as `hapteq resume` would log it."""
+    """A note by the program itself about a removed last line, as `hapteq resume` would log it."""
     return NoteTaken(utc=clock.utc(), who="program", text=text)

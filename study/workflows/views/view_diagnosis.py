@@ -1,4 +1,4 @@
-"""A diagnosis in words and tables, from its document. Read only."""
+"""A diagnosis as sentences and tables for the terminal, from its document `diagnosis.json`. Only reads files."""
 
 from pathlib import Path
 
@@ -20,14 +20,16 @@ from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
 MISMATCH_HEADER = ("output", "input", "band", "amplitude", "where", "share", "p")
-"""Columns of the table of mismatches."""
+"""Columns of the table of mismatches: response, command, frequency band, amplitude of the command, state of the device,
+share of the mismatch, p-value."""
 FIT_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allow")
-"""Columns of the table of held-out errors."""
+"""Columns of the table of errors on fit and test samples: of the given model, the re-tuned model, the model with the
+named effects, and the noise between repeats."""
 
 
 def diagnosis_view(path: Path) -> DiagnosisView:
-    """The view of a diagnosis, from its document and the improved model beside it. Raises CannotReadError,
-    UnusableFileError."""
+    """The view of a diagnosis. path: its document; the improved model and the HTML report are looked for in the same
+    folder. Raises CannotReadError or UnusableFileError where the document cannot be used."""
     diagnosis, device = read_diagnosis(path), _device(path.parent / "improved.toml")
     report = path.parent / "report.html"
     view = DiagnosisView(
@@ -47,7 +49,8 @@ def diagnosis_view(path: Path) -> DiagnosisView:
 
 
 def _device(path: Path) -> Device | None:
-    """The device of the improved model beside the document, for the units of candidates; None if it cannot be read."""
+    """Number of axes and units of the improved model in this file, for the wording of parameters; None if it cannot be
+    read."""
     try:
         model = read_mechanical_model(path)
     except StudyError:
@@ -56,6 +59,7 @@ def _device(path: Path) -> Device | None:
 
 
 def _effect(effect: NamedEffect) -> tuple[str, ...]:
+    """Sentences on a named effect, and on effects that the recording cannot distinguish from it."""
     text = (
         f"{effect_sentence(effect)} It explains {_percent(effect.share)} of the mismatch left after re-tuning "
         f"(probability {_probability(effect.probability)})."
@@ -64,10 +68,12 @@ def _effect(effect: NamedEffect) -> tuple[str, ...]:
 
 
 def _mismatches(mismatches: tuple[Mismatch, ...]) -> tuple[tuple[str, ...], ...]:
+    """Table of mismatches with its header; empty without any."""
     return (MISMATCH_HEADER, *map(_mismatch, mismatches)) if mismatches else ()
 
 
 def _mismatch(mismatch: Mismatch) -> tuple[str, ...]:
+    """A row of the table of mismatches."""
     return (
         mismatch.output,
         mismatch.input,
@@ -80,11 +86,13 @@ def _mismatch(mismatch: Mismatch) -> tuple[str, ...]:
 
 
 def _errors(record: str, errors: Errors) -> tuple[str, ...]:
+    """A row of the table of errors. record: the set of samples."""
     values = (errors.before, errors.retuned, errors.after, errors.noise)
     return (record, *(NONE if value is None else f"{value:.4f}" for value in values))
 
 
 def _next_experiment_text(diagnosis: Diagnosis) -> str:
+    """Command, reason and discriminated effects of the proposed next experiment; empty without a proposal."""
     following = diagnosis.next_experiment
     if following is None:
         return ""
@@ -94,6 +102,7 @@ def _next_experiment_text(diagnosis: Diagnosis) -> str:
 
 
 def _notes(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Sentences on the error measure, the re-tuned parameters, and the remaining mismatch."""
     retuned = (f"Re-tuned: {conjoin(list(diagnosis.retuned))}.",) if diagnosis.retuned else ()
     left = (remainder_sentence(diagnosis),) if diagnosis.verdict in ("explained", "partly_explained") else ()
     measured = f"Errors are normalised root-mean-square over the channels, measured by {diagnosis.error}."

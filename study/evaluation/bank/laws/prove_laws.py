@@ -1,4 +1,9 @@
-"""Run a bank of concealed laws: seal, diagnose in separate processes, reveal, score."""
+"""Run a bank of concealed laws, a blind test of the diagnosis: seal, diagnose in separate processes, reveal, score.
+
+Each case is a simulated device with a law of motion or signals outside the catalogue of effects. The labels (the
+truths) are hashed before any diagnosis and checked when they are revealed. A found law is compared with the true one on
+a fresh test motion that the diagnosis never had (`law_error`).
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +23,7 @@ from study.evaluation.bank.sealed_bank import BankOptions, Progress, answered_fi
 from study.store.disk.provenance import sha256_of
 
 LAWS = "laws"
-"""Says in bank.json that laws are concealed."""
+"""Kind of bank in bank.json: laws are concealed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +40,10 @@ class LawBlindTest:
 
 
 def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawBlindTest:
-    """Run or continue a bank of laws in the folder `path`. Resumable. Raises StudyError."""
+    """Run a bank of laws in the folder `path`, or continue it after an interruption. Raises StudyError.
+
+    on_progress: called with the step ("sealing" or "diagnosing"), the number of cases done and of all cases.
+    """
     folder = open_proof_folder(path, plan.seed, plan.brief, LAWS)
     with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
@@ -49,7 +57,8 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
 
 
 def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
-    """Outcomes of the answered cases among the first `cases` numbers. Raises StudyError where a seal is broken."""
+    """Outcomes of the answered cases among the first `cases` numbers. Raises StudyError where a label or a fresh test
+    motion differs from its seal."""
 
     def is_whole(label: Mapping[str, Any]) -> bool:
         return sha256_of(fresh_file(folder, label["number"])) == str(label["fresh_sha256"])
@@ -61,6 +70,8 @@ def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
 
 
 def _outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh: Path) -> LawOutcome:
+    """One case with its true law (None where the case has none), and the error of the found laws on
+    each fresh test motion in the file `fresh`."""
     truth = None if label["truth"] is None else _true_law(label["truth"])
     found = LawOutcome(concealed=label["concealed"], truth=truth, **answered_fields(label, answer))
     if truth is None or not found.laws:
@@ -70,6 +81,7 @@ def _outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh: Path) -
 
 
 def _true_law(label: Mapping[str, Any]) -> TrueLaw:
+    """The true law from the values of its label."""
     return TrueLaw(
         label["law"],
         label["formula"],

@@ -1,5 +1,9 @@
-"""Write devices with laws outside the catalogue as files: open inputs for the diagnosis; sealed, the truth and a
-fresh test motion."""
+"""Bank of blind-test cases with laws outside the catalogue, written as files.
+
+Each case has open inputs for the diagnosis (recording, model, settings), and a sealed label with the true law and fresh
+test motions. Sealed means that the SHA-256 of each label is written, and can be published, before any case is
+diagnosed.
+"""
 
 import json
 import secrets
@@ -24,15 +28,15 @@ from study.store.formats.recording_file import write_recording
 
 
 def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
-    """Draw, write and seal the missing cases, calling `on_sealed(count)`. Returns the SHA-256 of labels.sha256.
-    Raises StudyError."""
+    """Draw, write and seal the missing cases in `workers` processes, calling `on_sealed(count)`. Returns the SHA-256 of
+    labels.sha256. Raises StudyError."""
     drawn = [draw_law(plan.seed, number, plan.brief) for number in range(plan.cases)]
     write_case = {each.number: partial(_seal_law, folder, each) for each in drawn}
     return seal_missing(folder, write_case, workers, on_sealed)
 
 
 def fresh_file(folder: ProofFolder, number: int) -> Path:
-    """Path of the sealed fresh motion of a case."""
+    """Path of the sealed fresh motions of a case."""
     return folder.label(number).with_suffix(".npz")
 
 
@@ -48,10 +52,12 @@ def fresh_motions(path: Path, axes: Sequence[str], pushed: Sequence[str], respon
 
 
 _KEPT = ("position", "velocity", "acceleration", "command", "reading", "lawful")
-"""Arrays of a fresh motion that are sealed; the first four give the variables x, v, a and f of an axis."""
+"""Sealed arrays of a fresh motion, (samples, axes) each; the first four are the variables x, v, a and f of an axis."""
 
 
 def _fresh_motion(of: dict[str, Any], axes: Sequence[str], pushed: Sequence[str], response: bool) -> FreshMotion:
+    """A fresh motion as columns (t in s, and x, v, a and f by axis), with the law's contribution on the axes `pushed`:
+    to the sensor reading (m/s²), or the force (N)."""
     columns = {"t": np.arange(len(of["command"])) / RATE_HZ}
     for place, axis in enumerate(axes):
         for prefix, name in zip(("", "v", "a", "f"), _KEPT, strict=False):
@@ -61,7 +67,7 @@ def _fresh_motion(of: dict[str, Any], axes: Sequence[str], pushed: Sequence[str]
 
 
 def _seal_law(folder: ProofFolder, each: LawDraw) -> None:
-    """Write one case; a missing label means an unfinished case."""
+    """Write one case. The label is written after all other files: without a label, the case is unfinished."""
     place = begin_case(folder)
     found = law_case(each, place.name)
     write_recording(place / RECORDING, found.case.recording, precision="float32")
@@ -75,6 +81,7 @@ def _seal_law(folder: ProofFolder, each: LawDraw) -> None:
 
 
 def _arrays(fresh: Sequence[Fresh]) -> dict[str, Any]:
+    """Arrays of all fresh motions by name and number, as `fresh_motions` reads them."""
     found = {}
     for number, each in enumerate(fresh):
         moved = (each.moved.position, each.moved.velocity, each.moved.acceleration)

@@ -1,10 +1,16 @@
-"""Decoys: physics outside the catalogue, which a diagnosis must leave unexplained.
+"""Decoys: physical effects outside the catalogue, which a diagnosis must leave unexplained rather than misname.
 
-creep: viscoelastic ground with three relaxation times over two decades, as in plastics and cables. damping_of_place:
-damping grows with the square of the distance from the centre. stiffness_in_time: the ground stiffness of one axis
-switches periodically. bending_sensor: soft saturation with hysteresis in all channels. crossed_axes: a potential c x^2
-y / 2. skipped_commands: every n-th command is not written. tired_motor: the force constant falls with heating.
-force_hysteresis: play between command and motor force, as in iron.
+* creep: viscoelastic ground with relaxation times over two decades, as of plastics and cables.
+* damping_of_place: damping of one axis that grows with the square of the position, from the centre.
+* stiffness_in_time: the ground stiffness of one axis switches periodically (square wave).
+* bending_sensor: soft saturation (tanh), then hysteresis (play operator), in all channels.
+* crossed_axes: a spring that couples the axes x and y, with the potential coupling x² y / 2.
+* skipped_commands: every n-th command is not written; the force of the command before is held.
+* tired_motor: the force constant falls in proportion to the averaged square of the force, as by heating.
+* force_hysteresis: play operator between command and motor force, as magnetic hysteresis.
+
+For each decoy, `_draw_…` draws the parameters for a strength from 0 to 1, between the two values given to
+`log_between`; these ranges were chosen by hand. `_build_…` returns the device with the effect.
 """
 
 from dataclasses import replace
@@ -27,6 +33,7 @@ CREEP_TIMES_S = (0.02, 0.2, 2.0)
 
 
 def _draw_creep(at: EffectContext) -> dict[str, float]:
+    """stiffness: N/m, of each of the relaxing springs; relative to the ground stiffness of the axis."""
     return {"stiffness": at.log_between(0.05, 1.0) * at.bench.stiffness[at.axis, at.axis]}
 
 
@@ -37,6 +44,7 @@ def _build_creep(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_damping(at: EffectContext) -> dict[str, float]:
+    """damping_per_m2: N s/m per m²; at the largest distance of the motion, 0.5 to 12 N s/m."""
     return {"damping_per_m2": at.log_between(0.5, 12.0) / at.travel_m[at.axis] ** 2}
 
 
@@ -45,6 +53,7 @@ def _build_damping(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_swing(at: EffectContext) -> dict[str, float]:
+    """rate_hz: of the switching; depth: change of the stiffness, relative to that of the axis."""
     return {"rate_hz": at.draw_log_uniform(0.7, 9.0), "depth": at.log_between(0.05, 0.7)}
 
 
@@ -56,6 +65,7 @@ def _build_swing(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_bending(at: EffectContext) -> dict[str, float]:
+    """bend: s²/m, reciprocal of the largest reading of the saturation; play: m/s², half its width."""
     return {"bend": at.log_between(0.3, 1.5) / at.peak_mps2.max(), "play": at.log_between(0.03, 0.8)}
 
 
@@ -64,6 +74,7 @@ def _build_bending(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_crossed(at: EffectContext) -> dict[str, float]:
+    """coupling: N/m²; relative to the ground stiffness of the x axis over the largest travel."""
     return {"coupling": at.sign() * at.log_between(0.02, 0.3) * at.bench.stiffness[0, 0] / at.travel_m.max()}
 
 
@@ -72,6 +83,7 @@ def _build_crossed(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_skipped(at: EffectContext) -> dict[str, float]:
+    """every: n; the command numbered n, 2n, … is not written. Stronger is a smaller n."""
     return {"every": float(round(at.log_between(2000.0, 8.0)))}
 
 
@@ -80,6 +92,7 @@ def _build_skipped(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_tired(at: EffectContext) -> dict[str, float]:
+    """loss_per_n2: share of the force lost per N² of mean square force; seconds: averaging time of that mean."""
     return {"loss_per_n2": at.log_between(0.02, 0.3), "seconds": at.draw_log_uniform(2.0, 8.0)}
 
 
@@ -88,6 +101,7 @@ def _build_tired(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_iron(at: EffectContext) -> dict[str, float]:
+    """half_width: N, half the play between command and force."""
     return {"half_width": at.log_between(0.01, 0.3)}
 
 
@@ -105,4 +119,4 @@ DECOYS = (
     ConcealedEffect("tired_motor", "actuator", True, _draw_tired, _build_tired),
     ConcealedEffect("force_hysteresis", "actuator", True, _draw_iron, _build_iron),
 )
-"""As `EFFECTS` of the other files; the names are none of the vocabulary."""
+"""The decoys, in the form of `EFFECTS` in the modules of this package; no name is in the vocabulary of effects."""

@@ -1,15 +1,16 @@
-"""Inertia and damping of the mechanism beyond the model.
+"""Concealable effects of inertia and damping of the mechanism that the model of a simulated device lacks.
 
-Viscous damping and an added mass act on one axis of the handle. Quadratic damping is -c v |v|. Pose-dependent inertia
-multiplies the mass by 1 + per_m x, with x along the named axis and without the force from its derivative; it is drawn
-whether this holds for the whole handle or only for this axis's motion. An extra mode is a mass on a spring attached to
-the handle; its direction deviates from the named axis by up to 0.25 towards each other axis. Backlash lies between the
-motor (a part of the axis's mass, on which the force acts) and the handle; in contact a stiff spring with little damping
-joins them.
+- Viscous damping -d v (N s/m) and an added mass (kg) act on one axis of the handle.
+- Quadratic damping is the force -c v |v| (c in N s²/m²).
+- Pose-dependent inertia multiplies the mass by 1 + b x (b in 1/m), with x along the named axis and without the force
+  from the derivative of the mass; whether it holds for the whole handle or for motion along this axis only is drawn.
+- An extra mode is a mass (kg) on a spring and damper attached to the handle (natural frequency in Hz); its direction
+  has components up to 0.25 along each other axis, relative to the named axis.
+- Backlash (total gap in m) lies between the motor, a part of the axis's mass on which the force acts, and the handle;
+  in contact a stiff spring (N/m) with little damping (N s/m) couples them.
 
-Ranges are set by hand for a device of the omega.3's size, from a weak effect to a strong one; strengths 0 and 1 are
-their ends (`EffectContext.log_between`). Units: damping N s/m, mass kg, quadratic damping N s²/m², gap m, frequency Hz,
-inertia 1/m over the handle's travel.
+Ranges were set by hand for a device of the size of the omega.3. Strengths 0 and 1 are the ends of the main parameter's
+range (`EffectContext.log_between`); other parameters are drawn independently of the strength.
 """
 
 from dataclasses import replace
@@ -22,6 +23,7 @@ from study.evaluation.challenge.handle_force_kernel import DRAG
 
 
 def _at_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Device:
+    """The device with a mass (kg) and a viscous damping (N s/m) added to one axis of the handle."""
     mass, damper = device.bench.mass.copy(), device.bench.damping.copy()
     mass[axis, axis] += mass_kg
     damper[axis, axis] += damping
@@ -53,6 +55,7 @@ def _build_quadratic(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_pose(at: EffectContext) -> dict[str, float]:
+    """per_m (1/m): the mass changes by 1 to 50 % over the largest distance from the centre."""
     whole = float(at.random.integers(2))
     return {"per_m": at.sign() * at.log_between(0.01, 0.5) / at.travel_m[at.axis], "whole_handle": whole}
 
@@ -66,6 +69,8 @@ def _build_pose(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_mode(at: EffectContext) -> dict[str, float]:
+    """Parameters of the oscillator. The tilts are components of its direction along the two other axes, in cyclic
+    order."""
     tilts = at.random.uniform(-0.25, 0.25, 2)
     return {
         "frequency": at.draw_log_uniform(18.0, 190.0),
@@ -88,6 +93,8 @@ def _build_mode(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_backlash(at: EffectContext) -> dict[str, float]:
+    """The motor has 20 to 40 % of the axis's mass m; contact stiffness m (2 pi f)² with f from 220 to 400 Hz, contact
+    damping 2 zeta sqrt(stiffness m) with zeta from 0.015 to 0.06."""
     mass = at.bench.mass[at.axis, at.axis] * at.random.uniform(0.2, 0.4)
     spring = mass * (2 * np.pi * at.draw_log_uniform(220.0, 400.0)) ** 2
     return {
@@ -111,4 +118,4 @@ EFFECTS = (
     ConcealedEffect("extra_mode", "mechanism", True, _draw_mode, _build_mode),
     ConcealedEffect("backlash", "mechanism", True, _draw_backlash, _build_backlash),
 )
-"""Name, place, whether it belongs to one axis, draw of its parameters, and how it is built."""
+"""Fields of each entry: name, place, whether it acts on one axis, draw of its parameters, and its construction."""

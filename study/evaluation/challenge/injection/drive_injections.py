@@ -1,5 +1,9 @@
-"""Faults of the drive (amplifier, motor), injected by altering the recorded command; the principle is in
-`force_injections`."""
+"""Faults of the drive (amplifier, motor), injected by altering the recorded command (inverse injection).
+
+The measured motion stays. A drive with the characteristic g would have needed the command u' with g(u') = u for the
+recorded command u, and u' takes its place; see `force_injections`. Saturation, slew limit and quantization have no
+unique inverse: their commands are approximations.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,12 +14,12 @@ from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.injection.axis_motion import AxisMotion
 
 Values = Mapping[str, float]
-"""Parameters of a fault by name, in the units of the recording."""
+"""Parameters of a fault by name, in the units of the recording; times in seconds."""
 NEWTON_STEPS = 60
 """Newton steps to the command that a cubic gain turns into the recorded one: far more than convergence takes."""
 HIGH_QUANTILE = 0.98
-"""Quantile of the command's size, or of its steps, at which a saturation or a slew limit is put: rarely reached, yet
-reached. By hand, as are all ranges below."""
+"""Quantile of the command's magnitude, or of its steps, at which a saturation or a slew limit is placed, so that it is
+reached, but rarely. Chosen by hand, as are all ranges below."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,22 +29,23 @@ class ForceInjection:
     effect: str
     """Name in the vocabulary, or a new name in its style."""
     draw: Callable[[AxisMotion, float, np.random.Generator], dict[str, float]]
-    """Parameters from the strength, 0 (weakest) to 1."""
+    """Draws the parameters for a motion and a strength, 0 (weakest) to 1."""
     command: Callable[[AxisMotion, Values], FloatArray]
     """(n,): the command that would have been needed with the fault."""
     actuator: bool = False
-    """A fault of the drive: it does not exist where the motion is imposed."""
+    """Whether the fault is of the drive; such a fault does not exist where the motion is imposed."""
     memory: bool = False
-    """Depends on what was before: begins anew with each take."""
+    """Whether the fault depends on earlier samples; it then starts anew with each take."""
 
 
 def rms(samples: FloatArray) -> float:
-    """Root mean square."""
+    """Root mean square about the mean."""
     return float(np.sqrt(np.mean((samples - samples.mean()) ** 2)))
 
 
 def level_of(motion: AxisMotion, strength: float) -> float:
-    """Rms of the injected force: log-uniform from a fiftieth of the command's rms to all of it."""
+    """Rms of the injected force, in the command's unit: from a fiftieth of the command's rms (strength 0) to all of it
+    (1), logarithmic in the strength."""
     return rms(motion.command) * float(0.02 * 50.0**strength)
 
 
@@ -59,24 +64,27 @@ def _undo_cubic_gain(motion: AxisMotion, values: Values) -> FloatArray:
 
 
 def _draw_limit(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    """Limit of the force, and relative increase of the command where it is reached, 0.05 to 1."""
     limit = float(np.quantile(np.abs(motion.command), HIGH_QUANTILE))
     return {"limit": limit, "more": float(0.05 * 20.0**strength)}
 
 
 def _undo_saturation(motion: AxisMotion, values: Values) -> FloatArray:
-    """A larger command wherever the force was at its limit."""
+    """A larger command wherever the force reached 97 % of its limit."""
     over = np.abs(motion.command) >= 0.97 * values["limit"]
     return np.asarray(np.where(over, motion.command * (1 + values["more"]), motion.command))
 
 
 def _draw_rate(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    """Highest rate of the force, and the fraction of it from which the force counts as limited: 0.95 down to 0.3."""
     steps = np.abs(np.diff(motion.command))
     top = float(np.quantile(steps[steps > 0], HIGH_QUANTILE)) if steps.any() else 0.0
     return {"rate": top * motion.rate_hz, "from": 1.0 - 0.05 * 14.0**strength}
 
 
 def _undo_slew_limit(motion: AxisMotion, values: Values) -> FloatArray:
-    """A command that arrives at once wherever the force changed at about its highest rate."""
+    """A command that steps at once to the end of each stretch over which the force changed in one direction at about
+    its highest rate."""
     steps = np.diff(motion.command)
     fast = np.abs(steps) * motion.rate_hz >= values["from"] * values["rate"]
     goes_on = fast[1:] & fast[:-1] & (steps[1:] * steps[:-1] > 0)
@@ -87,11 +95,12 @@ def _undo_slew_limit(motion: AxisMotion, values: Values) -> FloatArray:
 
 
 def _gain(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    """Gain above 1 by 2 % to 80 %, or below 1 by half as much."""
     return {"gain": float(1 + random.choice((-0.5, 1.0)) * 0.02 * 40.0**strength)}
 
 
 def _middle_turn(samples: FloatArray, rate_hz: float) -> float:
-    """Median angular frequency (rad/s) of the power."""
+    """Angular frequency (rad/s) below which half of the power lies, the mean removed."""
     power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
     middle = int(np.searchsorted(np.cumsum(power), power.sum() / 2))
     return 2 * np.pi * max(middle, 1) * rate_hz / len(samples)

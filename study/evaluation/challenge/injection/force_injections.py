@@ -1,10 +1,12 @@
 """Faults of the mechanism, injected by altering the recorded command (inverse injection).
 
-The measured motion stays. A mechanism with an additional force F(x, v, a) would have needed u + F for the same motion,
-and a drive with the characteristic g would have needed u' with g(u') = u. Both are what a controller that imposes the
-motion would command, and exact for any other behaviour of the device.
+The measured motion is left unchanged. A mechanism with an additional resisting force F(x, v, a) would have needed the
+command u + F for the same motion; a drive with the static characteristic g would have needed u' with g(u') = u. Both
+are exact for any other dynamics of the device, because a controller that imposes the motion would command just these
+forces.
 
-Written for the challenge only: no code is shared with the effects that a diagnosis compares.
+Written for the challenge only: no code is shared with the effects that a diagnosis compares, so that an error there
+cannot cancel here. Ranges of the drawn parameters are set by hand.
 """
 
 from collections.abc import Callable
@@ -22,11 +24,11 @@ from study.evaluation.challenge.injection.drive_injections import (
 )
 
 SHARP = 0.05
-"""Width of the sign change of dry friction, as a fraction of the rms speed."""
+"""Width of the smoothed sign change of dry friction, tanh(v / width), as a fraction of the rms speed."""
 
 
 def _scale_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceInjection:
-    """Injection of a force with one parameter, which scales a given shape."""
+    """Injection of the force size * shape(motion). `size` is drawn so that the rms of the force is `level_of`."""
 
     def draw(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
         return {"size": level_of(motion, strength) / max(rms(shape(motion)), 1e-300)}
@@ -35,51 +37,60 @@ def _scale_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceI
 
 
 def _sign(motion: AxisMotion) -> FloatArray:
+    """(n,): smoothed sign of the velocity, -1 to 1."""
     return np.asarray(np.tanh(motion.v / max(SHARP * float(np.sqrt(np.mean(motion.v**2))), 1e-300)))
 
 
 def _centre_position(motion: AxisMotion) -> FloatArray:
+    """(n,): position relative to the middle of its range."""
     return np.asarray(motion.q - 0.5 * (motion.q.min() + motion.q.max()))
 
 
 def _draw_cogging(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    """Amplitude, pitch (3 to 30 % of the travel) and phase (turns) of cogging. 1.4: amplitude over rms of a sine."""
     pitch = float(np.ptp(motion.q)) * float(random.uniform(0.03, 0.3))
     return {"amplitude": 1.4 * level_of(motion, strength), "pitch": pitch, "turn": float(random.random())}
 
 
 def _add_cogging(motion: AxisMotion, values: Values) -> FloatArray:
+    """(n,): command with the force amplitude * sin(2 pi (q / pitch + turn))."""
     return motion.command + values["amplitude"] * np.sin(2 * np.pi * (motion.q / values["pitch"] + values["turn"]))
 
 
 def _travel_beyond(motion: AxisMotion, position: float) -> FloatArray:
+    """(n,): penetration of stops at +-position from the centre; 0 between them."""
     far = _centre_position(motion)
     return np.asarray(np.sign(far) * np.maximum(np.abs(far) - position, 0.0))
 
 
 def _draw_stop(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    """Position of the stops, 40 to 90 % of the largest excursion, and their stiffness."""
     position = float(random.uniform(0.4, 0.9)) * float(np.abs(_centre_position(motion)).max())
     stiffness = level_of(motion, strength) / max(rms(_travel_beyond(motion, position)), 1e-300)
     return {"position": position, "stiffness": stiffness}
 
 
 def _draw_asymmetric(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    """Friction levels of the two directions, which differ from their mean by 20 to 60 %."""
     level, share = 1.2 * level_of(motion, strength), float(random.uniform(0.2, 0.6))
     return {"level_positive": level * (1 + share), "level_negative": level * (1 - share)}
 
 
 def _add_asymmetric_friction(motion: AxisMotion, values: Values) -> FloatArray:
+    """(n,): command with Coulomb friction of a different level in each direction."""
     sign = _sign(motion)
     return motion.command + np.where(sign > 0, values["level_positive"], values["level_negative"]) * sign
 
 
 def _draw_bristles(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+    """Friction level, and stiffness of the bristle, which slips after 1 to 15 % of the travel."""
     give = float(np.ptp(motion.q)) * float(random.uniform(0.01, 0.15))
     level = 1.2 * level_of(motion, strength)
     return {"level": level, "stiffness": level / give}
 
 
 def _add_bristles(motion: AxisMotion, values: Values) -> FloatArray:
-    """Elastoplastic friction: a spring that slides at the level."""
+    """(n,): command with elastoplastic friction: a spring whose force is limited to +-level, from 0 at the start."""
     force, found = 0.0, np.empty(len(motion.q))
     for k, way in enumerate(np.diff(motion.q, prepend=motion.q[0])):
         force = min(max(force + values["stiffness"] * way, -values["level"]), values["level"])

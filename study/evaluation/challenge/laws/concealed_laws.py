@@ -1,7 +1,8 @@
-"""The concealed laws: formulas outside the catalogue, with parameters drawn anew for each device.
+"""Concealed laws of the blind test: formulas outside the catalogue, with parameters drawn anew for each device.
 
-They share no code with the grammar of the diagnosis, and some have shapes that the grammar cannot express. The label
-describes a law as a reader would: on what it acts, which variables it needs, whether it has a memory.
+They test whether the diagnosis discovers a law that it does not know. They share no code with its grammar of laws, and
+some have shapes that the grammar cannot express. The label of a law states on what it acts, which variables it needs,
+and whether it has a memory, so that an answer can be judged without comparing formulas.
 """
 
 from collections.abc import Callable
@@ -15,7 +16,7 @@ from study.evaluation.challenge import law_kernel as kernel
 
 Random = np.random.Generator
 ActsOn = Literal["force", "command", "response"]
-"""What a law changes: the force on the handle, the command, or the reading."""
+"""Quantity that a law changes: the force on the handle, the command, or the sensor's reading."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,8 @@ class LawKind:
 
     name: str
     formula: str
-    """For a reader; k is the size, a and b parameters, s a sign, x along its axis, y along another."""
+    """For a reader; k is the size, a and b parameters, s a sign; x and v are position and velocity along its axis, y is
+    another axis, u the command, r the reading; lag(x, a) is x behind a first-order low-pass of time constant a (s)."""
     draw: Callable[[Random, Sizes], tuple[float, float]]
     """Draws a and b."""
     variables: tuple[str, ...]
@@ -44,11 +46,13 @@ class LawKind:
     acts_on: tuple[ActsOn, ...] = ("force",)
     """Equivalent places of action."""
     memory: bool = False
+    """Whether the force depends on earlier motion or commands."""
     axes: int = 1
+    """Number of axes in the formula."""
     both: bool = False
     """Whether the law acts on the other axis as well."""
     change: Callable[[FloatArray, FloatArray, float, float], FloatArray] | None = None
-    """For commands or readings: change for k = 1, from own axis, other axis, a and b."""
+    """For laws of commands or readings: the change for k = 1, from values of its own axis and of another, a and b."""
 
 
 def _draw_simple_or_any(random: Random, simple: tuple[float, ...], low: float, high: float) -> float:
@@ -57,54 +61,67 @@ def _draw_simple_or_any(random: Random, simple: tuple[float, ...], low: float, h
 
 
 def _no_parameters(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """The formula has no parameters."""
     return 0.0, 0.0
 
 
 def _speed_power(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: exponent of the speed."""
     return _draw_simple_or_any(random, (1.5, 3.0), 1.3, 3.2), 0.0
 
 
 def _place_power(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: exponent of the position."""
     return _draw_simple_or_any(random, (1.5, 2.0, 5.0), 1.4, 4.0), 0.0
 
 
 def _low_power(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: exponent, 1 or 2."""
     return float(random.choice((1.0, 2.0))), 0.0
 
 
 def _pitch(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: spatial period (m), a part of the travel; b: phase (rad)."""
     return sizes.travel_m * random.uniform(0.3, 0.9), random.uniform(-np.pi, np.pi)
 
 
 def _pump(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: frequency (Hz); b: phase (rad)."""
     return random.uniform(0.5, 6.0), random.uniform(-np.pi, np.pi)
 
 
 def _magnet(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: distance of the attracting body (m), beyond the travel; b: exponent."""
     return sizes.travel_m * random.uniform(1.4, 2.2), float(random.choice((1.0, 2.0, 3.0)))
 
 
 def _quick(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: time constant (s), 8 ms to 0.4 s, log-uniform."""
     return float(np.exp(random.uniform(np.log(0.008), np.log(0.4)))), 0.0
 
 
 def _draw_slow(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: time constant (s), 0.4 s to 4 s."""
     return random.uniform(0.4, 4.0), 0.0
 
 
 def _part_of_speed(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: speed (m/s), a part of the largest."""
     return sizes.speed_mps * random.uniform(0.1, 0.5), 0.0
 
 
 def _part_of_travel(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: position (m), a part of the largest; b: exponent 1.5, which a contact uses (Hertz)."""
     return sizes.travel_m * random.uniform(0.1, 0.5), 1.5
 
 
 def _part_of_force(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: force (N), a part of the largest."""
     return sizes.force_n * random.uniform(0.3, 0.8), 0.0
 
 
 def _part_of_reading(random: Random, sizes: Sizes) -> tuple[float, float]:
+    """a: acceleration (m/s²), a part of the largest."""
     return sizes.reading_mps2 * random.uniform(0.3, 0.8), 0.0
 
 
@@ -112,6 +129,7 @@ def _force(  # noqa: PLR0913 - the columns of the table below
     name: str, formula: str, code: int, draw: Callable[[Random, Sizes], tuple[float, float]],
     *variables: str, axes: int = 1, memory: bool = False, both: bool = False,
 ) -> LawKind:  # fmt: skip
+    """A family of laws that add a force."""
     return LawKind(name, formula, draw, variables, code, memory=memory, axes=axes, both=both)
 
 
@@ -148,6 +166,6 @@ LAW_KINDS: tuple[LawKind, ...] = (
     LawKind("sensor of two axes", "rx + s k rx ry", _no_parameters, ("ax ay",), acts_on=("response",), axes=2,
             change=lambda r, other, a, b: r * other),
 )  # fmt: skip
-"""All families of laws, in the order in which they take turns."""
+"""All families of laws; the devices of a bank cycle through them in random order."""
 LAW_OF_NAME = {kind.name: kind for kind in LAW_KINDS}
 """Families by name."""

@@ -1,8 +1,9 @@
-"""The bench as MuJoCo simulates it: a handle on three slides, oscillators that ride on it, and the concealed effects.
+"""The bench of the blind test as a MuJoCo model: a handle on three slides, attached oscillators, concealed effects.
 
-Dry friction is the engine's own friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a
-dead band; play is a motor body behind a tendon with limits; a hand and added masses are armature, damping and stiffness
-of the slides; saturation, gain and lag are those of its actuators. Integrator: Runge-Kutta of fourth order.
+A second physics engine, so that cases do not depend on hapteq's own simulation alone. Dry friction is the engine's own
+friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a dead band; backlash is a motor body
+behind a tendon with limits; a hand and added masses are armature, damping and stiffness of the slides; saturation, gain
+and lag are those of its actuators. Integrator: Runge-Kutta of fourth order.
 """
 
 from collections.abc import Mapping
@@ -23,7 +24,8 @@ STEP_S = 1.0 / (RATE_HZ * STEPS)
 HANDLE_SHARE = 0.4
 """Mass of the handle's body over that of the lightest axis. The rest of an axis's mass moves with that axis alone."""
 CONTACT = 0.01
-"""Impedance of a contact: small, so that spring and damper have their nominal values."""
+"""MuJoCo's constraint impedance (0 to 1) of a contact: small, so that the contact force is that of a spring and a
+damper with their nominal values."""
 
 Values = Mapping[str, float]
 """Drawn parameters of an effect, by name."""
@@ -31,34 +33,44 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MujocoBench:
-    """Parameters; each array (3,), of the driven axes."""
+    """Parameters of the bench and of its concealed effects; each array (3,), of the driven axes."""
 
     mass_kg: FloatArray
     damping: FloatArray
+    """N s/m, to the ground."""
     stiffness: FloatArray
+    """N/m, to the ground."""
     riders: Oscillators
+    """Oscillators attached to the handle."""
     friction_n: FloatArray
+    """Dry friction."""
     force_n: FloatArray
+    """Constant force on the handle."""
     gain: FloatArray
+    """Force per command."""
     limit_n: FloatArray
-    """0 = none."""
+    """Saturation of the force; 0 = none."""
     lag_s: float = 0.0
+    """Time constant of the actuators' first-order lag; 0 = none."""
     delay_s: float = 0.0
+    """Delay of the commands, rounded to integration steps."""
     stop: tuple[int, float, float, float] | None = None
-    """Axis, lower and upper end (m), N/m."""
+    """End stop: axis, lower and upper end (m), stiffness (N/m)."""
     play: tuple[int, Values] | None = None
-    """Axis, and the parameters of `backlash`."""
+    """Axis, and the parameters of `backlash`: motor mass, gap, contact stiffness and damping (SI units)."""
 
 
 def bare(bench: Bench) -> MujocoBench:
-    """The closest MuJoCo equivalent of a bench: without its off-diagonals."""
+    """The closest MuJoCo equivalent of a bench, without concealed effects: the off-diagonal terms of mass, damping and
+    stiffness are dropped."""
     mass, damping, stiffness = (np.diag(part).copy() for part in (bench.mass, bench.damping, bench.stiffness))
     none = np.zeros(3)
     return MujocoBench(mass, damping, stiffness, bench.oscillators, none, none, np.ones(3), none)
 
 
 def linear(bench: MujocoBench) -> Bench:
-    """The linear part as a bench. A rider is carried across its direction, which adds to the handle's mass there."""
+    """The linear part as a bench. Perpendicular to its slide, an oscillator moves with the handle, so that its mass
+    adds to the handle's in these directions."""
     mass = np.diag(bench.mass_kg)
     for kg, along in zip(bench.riders.mass_kg, bench.riders.direction, strict=True):
         mass += kg * (np.eye(3) - np.outer(along, along))
@@ -66,9 +78,9 @@ def linear(bench: MujocoBench) -> Bench:
 
 
 def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Acceleration and position of the handle at the samples, (samples, 3) each, just before each command is written.
+    """Acceleration (m/s²) and position (m) of the handle, (samples, 3) each, just before each command is written.
 
-    Raises ValueError where the motion diverges.
+    command: (samples, 3), N. Raises ValueError where the motion is not finite or reaches 1 m.
     """
     model = mujoco.MjModel.from_xml_string(_model_xml(bench))
     data = mujoco.MjData(model)
@@ -96,10 +108,12 @@ def with_delay(bench: MujocoBench, delay_s: float) -> MujocoBench:
 
 
 def _command_at(command: FloatArray, sample: int) -> FloatArray:
+    """Command of a sample; zero before the first."""
     return command[sample] if sample >= 0 else np.zeros(3)
 
 
 def _model_xml(bench: MujocoBench) -> str:
+    """MuJoCo's description of the bench (MJCF). Armature adds inertia along a single joint, so that axes differ."""
     root = Xml.Element("mujoco")
     _add(root, "compiler", {"autolimits": "true"})
     exact = {"integrator": "RK4", "tolerance": "1e-12", "iterations": "50"}
@@ -135,6 +149,7 @@ def _model_xml(bench: MujocoBench) -> str:
 
 
 def _riders(handle: Xml.Element, riders: Oscillators) -> None:
+    """Add each oscillator as a body on a slide with spring and damper, along its direction."""
     for k, (hz, kg, ratio, along) in enumerate(
         zip(riders.frequency_hz, riders.mass_kg, riders.damping_ratio, riders.direction, strict=True)
     ):
@@ -145,11 +160,11 @@ def _riders(handle: Xml.Element, riders: Oscillators) -> None:
 
 
 def _add_play(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Values) -> None:
-    """Tendon between motor and handle that limits their distance: a one-sided contact at either end of the gap."""
+    """Backlash: a tendon between motor and handle limits their distance, a one-sided contact at each end of the gap."""
     motor_kg = values["motor_mass"]
     mass, _, _ = linear(bench).matrices()
     mass[axis, axis] -= motor_kg
-    # The engine takes a contact's spring and damper for the mass that they move.
+    # MuJoCo takes stiffness and damping of a contact per unit of effective mass, here of motor and handle in series.
     reduced = 1.0 / (1.0 / motor_kg + np.linalg.inv(mass)[axis, axis])
     spring, damper = values["contact_stiffness"] / reduced, values["contact_damping"] / reduced
     half = 0.5 * values["gap"]
@@ -160,6 +175,7 @@ def _add_play(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Value
 
 
 def _actuators(parent: Xml.Element, bench: MujocoBench) -> None:
+    """Add the force of each axis, with gain, saturation and lag; with backlash it acts on the motor."""
     for j, name in enumerate(AXES):
         driven = "motor" if bench.play is not None and bench.play[0] == j else name
         made = _add(parent, "general", {"joint": driven, "gainprm": float(bench.gain[j])})
@@ -171,6 +187,8 @@ def _actuators(parent: Xml.Element, bench: MujocoBench) -> None:
 
 
 def _slide(body: Xml.Element, name: str, along: FloatArray, values: Mapping[str, float]) -> None:
+    """Add a sliding joint along a direction; values that are zero are left out. Dry friction is a nearly rigid
+    constraint with a time constant of two steps and a damping ratio of 1."""
     joint = _add(body, "joint", {"name": name, "type": "slide", "axis": " ".join(f"{part:.15g}" for part in along)})
     for key, value in values.items():
         if value:
@@ -181,10 +199,11 @@ def _slide(body: Xml.Element, name: str, along: FloatArray, values: Mapping[str,
 
 
 def _body(body: Xml.Element, mass_kg: float) -> None:
-    """The engine gives bodies a moment of inertia, which slides never use."""
+    """Give a body its mass. MuJoCo also requires a moment of inertia, which has no effect on slides."""
     _add(body, "inertial", {"pos": "0 0 0", "mass": mass_kg, "diaginertia": "1e-4 1e-4 1e-4"})
 
 
 def _add(parent: Xml.Element, kind: str, attributes: Mapping[str, str | float] | None = None) -> Xml.Element:
+    """Append an element; numbers are written with 15 digits."""
     written = {key: value if isinstance(value, str) else f"{value:.15g}" for key, value in (attributes or {}).items()}
     return Xml.SubElement(parent, kind, written)

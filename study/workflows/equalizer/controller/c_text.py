@@ -1,4 +1,8 @@
-"""A controller as C: tables of numbers, each written so that it is read back to the same bits, set into the sources."""
+"""Export of a real-time controller as C source: its sizes and tables of numbers are inserted into templates.
+
+Each number is the shortest decimal that a compiler reads back to the same double (`repr`), so that the C program
+computes with exactly the numbers of the Python controller.
+"""
 
 from importlib.resources import files
 from math import comb
@@ -10,26 +14,28 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.realtime.controller_cases import ControllerCases
 from equalizer.tracking.realtime.realtime_controller import RealtimeController
 
+# Files of an export: the controller, a loop that uses it, and a program that checks it.
 HEADER, EXAMPLE, CHECK = "hapteq_controller.h", "example_loop.c", "check_controller.c"
 A_LINE = 6
-"""Numbers per line."""
+"""Numbers per line of a table."""
 GROUP = 4
-"""Rows and columns that a loop processes at once."""
+"""Rows and columns that a loop of the C code processes at once; matrices are padded to multiples of it."""
 
 
 def header_text(controller: RealtimeController, written_for: tuple[str, ...]) -> str:
-    """The C header of an exported controller. written_for: lines that describe the model; they become a comment."""
+    """C header with an exported controller. written_for: lines that describe the model; they become a comment."""
     comment = "\n".join(f"/* {line.replace('*/', '* /')} */" for line in written_for)
     return _source("controller.h").replace("@TABLES@", f"{comment}\n\n{_sizes(controller)}\n\n{_tables(controller)}")
 
 
 def example_text() -> str:
-    """C source of an example loop with the controller."""
+    """C source of an example of a real-time loop that calls the controller."""
     return _source(EXAMPLE)
 
 
 def check_text(cases: ControllerCases) -> str:
-    """C source of a program that checks the controller against these cases, which are set in as tables."""
+    """C source of a program that compares the compiled controller with these cases, inserted as tables: inputs, and the
+    forces that the Python controller computed."""
     tables = (
         c_table("case_rotation", cases.rotations.reshape(len(cases), -1)),
         c_table("case_transient_force", cases.transient_forces),
@@ -48,6 +54,7 @@ def c_table(name: str, values: npt.ArrayLike) -> str:
 
 
 def _c_initializer(numbers: FloatArray) -> str:
+    """Initializer of an array in braces, nested by dimension."""
     if numbers.ndim > 1:
         return "{" + ",\n".join(_c_initializer(row) for row in numbers) + "}"
     texts = [repr(value) for value in numbers.tolist()]
@@ -56,6 +63,7 @@ def _c_initializer(numbers: FloatArray) -> str:
 
 
 def _sizes(controller: RealtimeController) -> str:
+    """Preprocessor definitions of rate (Hz), force cap (N) and array sizes."""
     problem, split, tracker = controller.problem, controller.split, controller.tracker
     has_low, has_high = split.edges.low_hz is not None, split.edges.high_hz is not None
     sizes: dict[str, str] = {
@@ -79,6 +87,8 @@ def _sizes(controller: RealtimeController) -> str:
 
 
 def _tables(controller: RealtimeController) -> str:
+    """Definitions of all tables: matrices of the model and the controller, and filters that split the band. The weights
+    of the split are binomial coefficients, as in `CausalSplit`."""
     problem, split, tracker = controller.problem, controller.split, controller.tracker
     powers = range((split.order + 1) // 2, split.order + 1)
     tables = [
@@ -97,9 +107,10 @@ def _tables(controller: RealtimeController) -> str:
 
 
 def _pad_to_groups(matrix: FloatArray) -> FloatArray:
-    """Pad rows and columns with zeros to whole groups."""
+    """The matrix, padded with zero rows and columns to multiples of `GROUP`."""
     return np.pad(matrix, [(0, -size % GROUP) for size in matrix.shape])
 
 
 def _source(name: str) -> str:
+    """Text of a template in this package."""
     return (files("study.workflows.equalizer.controller") / name).read_text("utf-8")
