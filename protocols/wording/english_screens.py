@@ -248,5 +248,5 @@ SCREENS: dict[str, str] = {
     "line_thanks": "Thank you.",
     "line_check": "Device: {device}.",
     "line_check_look": "Something needs a look before you go on.",
-    "line_check_prompt": "Enter goes on, c checks again, q leaves: ",
+    "line_check_prompt": "Enter continues, c checks again, q leaves: ",
 }

@@ -30,7 +30,7 @@ def begin(study, small_file) -> Terminal:
     terminal = study("--protocol", str(small_file), "--seed", "4")
     terminal.wait_for("Participant code")
     terminal.type("P07\n")
-    terminal.wait_for("The device is ready.*Enter goes on")
+    terminal.wait_for("The device is ready.*Enter continues")
     terminal.type("\n")
     shown = terminal.wait_for("Press Enter to begin")
     assert "up-left to down-right" in shown
@@ -64,7 +64,7 @@ def test_from_the_code_to_the_report_with_a_kill_in_the_middle(study, small_file
     terminal.kill()
 
     again = study("P07_001", command="resume")
-    again.wait_for("The device is ready.*Enter goes on")
+    again.wait_for("The device is ready.*Enter continues")
     again.type("\n")
     assert "3 answers are on the disk" in again.wait_for("Press Enter to begin")
     again.type("\n")
@@ -117,7 +117,7 @@ def test_a_closed_terminal_loses_nothing(study, small_file, tmp_path):
     terminal.hang_up()
     assert terminal.process.wait(timeout=30) != 0
     again = study("P07_001", command="resume")
-    again.wait_for("The device is ready.*Enter goes on")
+    again.wait_for("The device is ready.*Enter continues")
     again.type("\n")
     assert "1 answer is on the disk" in again.wait_for("Press Enter to begin")
     again.type("q\n")

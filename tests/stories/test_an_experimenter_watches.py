@@ -45,7 +45,7 @@ def beside(tmp_path):
 @pytest.mark.timeout(120)
 def test_a_session_is_watched_noted_paused_and_stopped(started, beside, small_file, tmp_path):
     person = started("study", "--plain", "--protocol", str(small_file), "--seed", "4", "--subject", "P07")
-    person.wait_for("The device is ready.*Enter goes on")
+    person.wait_for("The device is ready.*Enter continues")
     person.type("\n")
     person.wait_for("Press Enter to begin")
     person.type("\n")
@@ -64,7 +64,7 @@ def test_a_session_is_watched_noted_paused_and_stopped(started, beside, small_fi
     screen.wait_for("RUNNING")
     assert beside("watch", "--note", "asks for a lower chair")[0] == 0
     assert beside("watch", "--pause") == (0, "Paused. The participant goes on at their own screen.")
-    person.wait_for("Pause.*Enter goes on")
+    person.wait_for("Pause.*Enter continues")
     screen.wait_for("PAUSED")
     person.type("\n")
     person.wait_for(r"trial 1\b.*1 or 2\?")

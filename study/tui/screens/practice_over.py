@@ -15,7 +15,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class PracticeOverScreen(TranslatedScreen[None]):
-    """How many answers of a practice were right, and whether that is enough; Enter goes on."""
+    """How many answers of a practice were right, and whether that is enough; Enter continues."""
 
     PAGE = "help_practice"
     DEFAULT_CSS = "PracticeOverScreen { align: center middle; }"
