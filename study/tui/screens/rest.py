@@ -21,8 +21,8 @@ TICK_S = 0.2
 
 
 class RestScreen(TranslatedScreen[float]):
-    """Counts the enforced rest down and says how many runs are left; Enter continues once it is over. Returns the seconds
-    rested, never fewer than requested."""
+    """Counts the enforced rest down and says how many runs are left; Enter continues once it is over. Returns the
+    seconds rested, never fewer than requested."""
 
     PAGE = "help_rest"
     DEFAULT_CSS = """
