@@ -7,6 +7,7 @@ memory of the command, are left alone with a reason.
 """
 
 from collections.abc import Mapping
+from itertools import chain, takewhile
 
 import numpy as np
 
@@ -120,15 +121,13 @@ def invert_command_map(law: Law, meant: FloatArray, slip_n: float) -> FloatArray
 def _tabulate_to(law: Law, meant: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The table of the smallest range in which the map reaches the intended forces; the first where none does."""
     span = REACH * max(float(np.abs(meant).max()), np.finfo(np.float64).tiny)
-    first = _tabulate(law, span)
+    tables = (_tabulate(law, span * 2**doubling) for doubling in range(_MOST_DOUBLINGS + 1))
+    first = next(tables)
     if not _is_rising(first[1]):
         raise ValueError(
             f"the command map {law.text} falls somewhere, so it has no inverse; leave it out of what is compensated"
         )
-    for doubling in range(_MOST_DOUBLINGS + 1):
-        commands, forces = _tabulate(law, span * 2**doubling)
-        if not _is_rising(forces):
-            break
+    for commands, forces in takewhile(lambda table: _is_rising(table[1]), chain((first,), tables)):
         if forces[0] <= meant.min() and meant.max() <= forces[-1]:
             return commands, forces
     return first
