@@ -112,6 +112,7 @@ class HeldForceRig:
         self.closed = 0
         self.before_sensing: Callable[[], None] | None = None
         self.before_writing: Callable[[FloatArray], None] | None = None
+        self.trembling_axes = [1, 2]
 
     @property
     def info(self) -> DeviceInfo:
@@ -122,7 +123,7 @@ class HeldForceRig:
             self.before_sensing()
         self.sense_calls += 1
         reading = np.zeros(READING_SIZE)
-        reading[1:3] = 1e-5 * (self.sense_calls % 2)
+        reading[self.trembling_axes] = 1e-5 * (self.sense_calls % 2)
         return reading
 
     def buttons(self) -> frozenset[int]:

@@ -68,6 +68,7 @@ def test_a_close_that_is_interrupted_once_more_while_the_loop_ends_disconnects_a
 
 def test_an_interruption_while_a_recording_lets_go_stops_at_once(rigs, rig):
     clock = ImpatientClock()
+    rig.trembling_axes = [0, 1, 2]  # the force changes along x: a position that stood still there would be stale
 
     def interrupt(share: float) -> None:
         if share > 0.6:
