@@ -63,7 +63,7 @@ def count_clipped_samples(samples: FloatArray) -> int:
     at_top = filled >= top - tolerance
     # With the bin width of the top value, so that a rounded signal is compared step by step.
     next_below = int(np.sum((filled < top - tolerance) & (filled >= top - tolerance - width)))
-    if at_top.sum() < LEAST_SAMPLES or at_top.sum() < _CROWDED * next_below / max(1.0, width / max(step, width)):
+    if at_top.sum() < LEAST_SAMPLES or at_top.sum() < _CROWDED * next_below:
         return 0
     runs = runs_of(at_top)
     beyond = [_extrapolate_rise(filled, start, stop) for start, stop in runs]

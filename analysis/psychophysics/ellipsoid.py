@@ -118,7 +118,8 @@ def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None)
 def sensor_frame(recording: Recording) -> FloatArray | None:
     """(3, 3): rotation from the sensor's axes to the device's, as the recording states it; None if it states none.
 
-    Raises ValueError where its rows are not orthonormal: such a matrix would distort every ellipse.
+    Raises ValueError where its rows are not orthonormal, which would distort every ellipse, and for a reflection, which
+    would mirror it.
     """
     sensor = recording.meta.get("sensor")
     stated = sensor.get("frame_to_device") if isinstance(sensor, dict) else None
@@ -132,6 +133,8 @@ def sensor_frame(recording: Recording) -> FloatArray | None:
         raise ValueError(f"the sensor's frame has the shape {rotation.shape}; it must be (3, 3)")
     if not np.allclose(rotation @ rotation.T, np.eye(3), atol=ORTHONORMAL):
         raise ValueError("the sensor's frame is no rotation: its rows must be perpendicular and of length 1")
+    if np.linalg.det(rotation) < 0.0:
+        raise ValueError("the sensor's frame is a reflection, not a rotation: an axis of it has the wrong sign")
     return rotation
 
 

@@ -15,7 +15,8 @@ def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rat
     """One period of a logarithmic swept sine, shape (n,), which may be repeated without a jump.
 
     Equal time per octave. The end frequency is lowered by less than 1 / duration, so that the period holds a whole
-    number of cycles. Raises ValueError where the sweep would not be upwards or would pass half the rate.
+    number of cycles. Raises ValueError where the sweep would not be upwards, would pass half the rate, or would hold
+    less than a cycle.
     """
     if not 0 < from_hz < to_hz <= sample_rate_hz / 2:
         raise ValueError(
@@ -23,9 +24,11 @@ def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rat
             f"not {from_hz:g} to {to_hz:g}"
         )
     duration_s = n / sample_rate_hz
-    octaves = np.log(to_hz / from_hz)
-    cycles = from_hz * duration_s / octaves * (np.exp(octaves * np.arange(n) / n) - 1.0)
-    whole = from_hz * duration_s / octaves * (np.exp(octaves) - 1.0)
+    log_ratio = np.log(to_hz / from_hz)
+    cycles = from_hz * duration_s / log_ratio * (np.exp(log_ratio * np.arange(n) / n) - 1.0)
+    whole = from_hz * duration_s / log_ratio * (np.exp(log_ratio) - 1.0)
+    if whole < 1.0:
+        raise ValueError(f"a sweep of {duration_s:g} s from {from_hz:g} to {to_hz:g} Hz holds less than a cycle")
     wave: FloatArray = amplitude * np.sin(2 * np.pi * cycles * np.floor(whole) / whole)
     return wave
 

@@ -34,6 +34,11 @@ def test_a_sweep_that_cannot_be_is_refused(from_hz, to_hz):
         log_sweep(from_hz, to_hz, 1.0, 1000, RATE_HZ)
 
 
+def test_a_sweep_shorter_than_a_cycle_is_refused():
+    with pytest.raises(ValueError, match="less than a cycle"):
+        log_sweep(1.0, 2.0, 1.0, 500, RATE_HZ)
+
+
 def test_a_fade_starts_and_ends_at_zero_and_leaves_the_middle_alone():
     x = apply_fades(np.ones((100, 2)), 20, 30)
     assert x[0] == pytest.approx([0.0, 0.0])

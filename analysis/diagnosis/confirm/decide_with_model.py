@@ -80,9 +80,12 @@ def objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     if min(whole.low, last.low) <= 0:
         return "its gain on held-out data is not larger than what varies between stretches"
     if min(whole.gain, last.gain) < FURTHER_LAW_OF_ALL:
-        return f"on held-out data it takes {100 * min(whole.gain, last.gain):.0f} % of the error's power, not a third"
+        return (
+            f"on held-out data it explains {100 * min(whole.gain, last.gain):.0f} % of the error's power, "
+            f"and {100 * FURTHER_LAW_OF_ALL:.0f} % are required"
+        )
     if context.tuning.is_at_bound(found.after.fitted.deviations):
-        return "beside it, a parameter of the model stands at the end of its tolerance"
+        return "with it, a parameter of the model is fitted at the end of its tolerance"
     rival = _best_rival(context, result)
     if rival is not None and _not_better(context, rival, found.after):
         return f"these data cannot tell it from {rival.newest.replace('_', ' ')}"

@@ -60,6 +60,8 @@ def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
     for recording in recordings:
         for start, stop in parts_of(recording):
             begin = max(start, len(recording) - PART_MOST_SAMPLES)
+            if begin >= stop:
+                continue
             known = np.flatnonzero(_finite_samples(part_of(recording, begin, stop)))
             if len(known) and known[-1] - known[0] + 1 >= PART_LEAST_SAMPLES:
                 found.append(_fill_part(recording, begin + int(known[0]), begin + int(known[-1]) + 1))

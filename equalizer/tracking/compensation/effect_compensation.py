@@ -6,7 +6,7 @@ added on top would be counted twice: worse than none. It is best to identify on 
 subtracted. This is an approximation: it does not describe an axis that stuck while another was swept.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +81,7 @@ def compensate(
             added[:, axis] += _force_beyond_model(effect, axis, motion, model, identified_with_n) / gain[axis]
     for effect, axis in _effects_by_axis(used, model):
         if effect.kind == "force_deadband":
-            _compensate_deadband(effect.parameters["width"], played, added, axis, identified_with_n)
+            _compensate_deadband(effect.parameters, played, added, axis, identified_with_n)
         elif effect.law is not None and not _is_force(effect):
             _compensate_command_map(effect.law, played, added, axis, identified_with_n)
     difference = played + added - forces
@@ -186,12 +186,14 @@ def _compensate_command_map(
 
 
 def _compensate_deadband(
-    width: float, played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
+    parameters: Mapping[str, float], played: FloatArray, added: FloatArray, axis: int, identified_with_n: float | None
 ) -> None:
-    """Change the forces in place so that the force behind the dead band is the intended one."""
+    """Change the forces in place so that the force behind the dead band is the intended one. Of intended forces below
+    the jump, which no command gives, none is played."""
     if identified_with_n is not None:
-        played[:, axis] *= deadband_share(width, identified_with_n)
+        played[:, axis] *= deadband_share(parameters, identified_with_n)
     meant = played[:, axis] + added[:, axis]
     level = float(np.sqrt(np.mean(meant**2)))
     if level > 0:
-        added[:, axis] += width * np.tanh(meant / (SLIP_SHARE * level))
+        lost = (1.0 - parameters.get("jump", 0.0)) * parameters["width"]
+        added[:, axis] += lost * np.tanh(meant / (SLIP_SHARE * level))

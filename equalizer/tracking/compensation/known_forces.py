@@ -100,9 +100,20 @@ def equivalent_impedance(
     )
 
 
-def deadband_share(width: float, amplitude: float) -> float:
-    """Describing function of a dead band of half-width `width`: share of a sinusoid's fundamental that passes."""
-    if width >= amplitude:
+def pass_deadband(parameters: Mapping[str, float], command: FloatArray) -> FloatArray:
+    """The force behind a dead band: 0 where |u| <= width, else u - (1 - jump) width sgn(u)."""
+    width, jump = parameters["width"], parameters.get("jump", 0.0)
+    beyond = np.abs(command) > width
+    return np.asarray(np.where(beyond, command - (1.0 - jump) * width * np.sign(command), 0.0))
+
+
+def deadband_share(parameters: Mapping[str, float], amplitude: float) -> float:
+    """Describing function of a dead band: share of a sinusoid's fundamental that passes. With s = width / amplitude it
+    is 1 - 2/pi (arcsin s + s sqrt(1 - s^2)) of the dead zone, and 4/pi jump s sqrt(1 - s^2) of the jump (relay with
+    dead zone; Gelb and Vander Velde, 1968, chapter 2)."""
+    share = parameters["width"] / amplitude
+    if share >= 1.0:
         return 0.0
-    share = width / amplitude
-    return float(1 - 2 / np.pi * (np.arcsin(share) + share * np.sqrt(1 - share**2)))
+    root = np.sqrt(1 - share**2)
+    jump = 4 / np.pi * parameters.get("jump", 0.0) * share * root
+    return float(1 - 2 / np.pi * (np.arcsin(share) + share * root) + jump)

@@ -54,7 +54,7 @@ def reason_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
     if len(law.variables) != 1 or law.variables[0] not in (f"f{law.axis[-1:]}", law.axis):
         return SEVERAL
     tables = (_tabulate(law, span)[1] for span in _SPANS)
-    return "" if any(np.isfinite(forces).all() and (np.diff(forces) > 0).any() for forces in tables) else FOLDED
+    return "" if any(_is_rising(forces) and (np.diff(forces) > 0).any() for forces in tables) else FOLDED
 
 
 def compute_compensating_force(

@@ -20,6 +20,7 @@ from equalizer.tracking.compensation.effect_compensation import (
     slip_speed,
 )
 from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
+from equalizer.tracking.compensation.known_forces import pass_deadband
 from equalizer.tracking.feedforward.planned_motion import planned_motion
 
 HIGHEST_SHARE = 3.0
@@ -62,8 +63,7 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
             ):
                 freed[:, axis] = evaluate(effect.law, {effect.law.variables[0]: freed[:, axis]}, rate_hz)
             if effect.kind == "force_deadband":
-                beyond = np.maximum(np.abs(freed[:, axis]) - effect.parameters["width"], 0.0)
-                freed[:, axis] = np.copysign(beyond, freed[:, axis])
+                freed[:, axis] = pass_deadband(effect.parameters, freed[:, axis])
     for effect in physics.effects:
         acts_on = "force" if effect.law is None else effect.law.acts_on
         if acts_on == "force" and effect.kind != "force_deadband" and not reason_not_compensated(effect, inputs):

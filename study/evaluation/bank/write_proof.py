@@ -168,7 +168,7 @@ def commit() -> str:
     try:
         at = _git(root, "rev-parse", "HEAD")
         return at + ("+" if _git(root, "status", "--porcelain", "--untracked-files=no", ".", "../equalizer") else "")
-    except (OSError, subprocess.CalledProcessError):
+    except (OSError, subprocess.SubprocessError):
         return "unknown"
 
 

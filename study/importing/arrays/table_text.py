@@ -18,11 +18,13 @@ from study.store.disk.file_errors import CannotReadError
 _LOOKED_AT = 4096
 """Bytes searched for UTF-16 without a byte order mark, in which nearly every other byte of a table is zero."""
 _READ_FOR_WORDS = 65536
-"""Bytes at the beginning of a file from which a legacy encoding is detected."""
+"""Bytes of non-ASCII lines from which a legacy encoding is detected."""
 _ENCODINGS = ("gb18030", "shift_jis", "euc_jp", "euc_kr", "big5", "cp1251", "koi8_r", "cp1250", "cp1253")
 """Encodings that are tried where a text is neither UTF-8 nor Western European."""
 _BEYOND_ASCII = re.compile(r"[^\x00-\x7f]+")
 """A run of non-ASCII characters."""
+_BYTE_BEYOND_ASCII = re.compile(rb"[\x80-\xff]")
+_LINE_END = re.compile(rb"[\r\n]|\Z")
 _SHOWN = 24
 """Maximum number of characters in the sample of text that an error shows."""
 
@@ -74,9 +76,7 @@ def _decode(data: bytes, encoding: str) -> str:
 def _decode_other_encoding(data: bytes) -> TableText:
     """Detect a legacy encoding from the non-ASCII lines that are not comments (# or %), and decode. Raises ValueError
     where no encoding, or more than one, fits."""
-    begin = data if len(data) <= _READ_FOR_WORDS else data[: data.rfind(b"\n", 0, _READ_FOR_WORDS) + 1]
-    lines = [line for line in begin.splitlines() if not line.isascii() and not line.lstrip().startswith((b"#", b"%"))]
-    beyond = b"\n".join(lines)
+    beyond = b"\n".join(_find_lines_beyond_ascii(data))
     if _is_western(beyond):
         return TableText(data.decode("cp1252", errors="replace"), "")
     readings = {encoding: text for encoding in _ENCODINGS if (text := _readable(beyond, encoding))}
@@ -94,6 +94,21 @@ def _decode_other_encoding(data: bytes) -> TableText:
         f"it is no UTF-8 text, and its encoding is open ({shown}); save it as UTF-8, or state the encoding in the map: "
         f'under [csv], encoding = "{next(iter(sure or readings), "cp1252")}"'
     )
+
+
+def _find_lines_beyond_ascii(data: bytes) -> list[bytes]:
+    """The first non-ASCII lines that are not comments, up to `_READ_FOR_WORDS` bytes; a longer line is cut there."""
+    lines, size, read = list[bytes](), 0, 0
+    while size < _READ_FOR_WORDS and (found := _BYTE_BEYOND_ASCII.search(data, read)):
+        at = found.start()
+        begin = max(data.rfind(b"\n", read, at), data.rfind(b"\r", read, at), read - 1) + 1
+        end = _LINE_END.search(data, at)
+        read = end.start() if end else len(data)
+        line = data[begin : min(read, begin + _READ_FOR_WORDS - size)]
+        if not line.lstrip().startswith((b"#", b"%")):
+            lines.append(line)
+            size += len(line)
+    return lines
 
 
 def _is_western(data: bytes) -> bool:

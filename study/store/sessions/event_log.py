@@ -139,15 +139,23 @@ def readable_events(path: Path) -> tuple[Event, ...]:
 
 
 def mend(path: Path, contents: LogContents) -> None:
-    """Remove an incomplete last line, so that the next event starts on a line of its own. Raises OSError."""
+    """Remove an incomplete last line, so that the next event starts on a line of its own. Raises StudyError."""
     if not contents.torn_bytes:
         return
-    descriptor = os.open(path, os.O_WRONLY)
     try:
-        os.ftruncate(descriptor, os.fstat(descriptor).st_size - contents.torn_bytes)
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        descriptor = os.open(path, os.O_WRONLY)
+        try:
+            os.ftruncate(descriptor, os.fstat(descriptor).st_size - contents.torn_bytes)
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as problem:
+        raise StudyError(
+            "The session log cannot be written to",
+            f"The incomplete last line of {path.name} in {path.parent.name} cannot be removed: {problem.strerror}.",
+            "Make room or mend the disk.",
+            saved="All complete lines are on disk.",
+        ) from problem
 
 
 def _lock_file(descriptor: int, path: Path) -> None:

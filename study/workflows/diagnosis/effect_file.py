@@ -81,7 +81,8 @@ def read_entry(path: Path) -> LawEntry:
     except Exception as error:
         raise _refusal(f"{path} fails: {error}.", "Correct it, or leave --effect-file out.") from error
     entry = getattr(module, "ENTRY", None)
-    if not isinstance(entry, LawEntry) or entry.name in EFFECTS_BY_NAME or not NAME.fullmatch(entry.name):
+    taken = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
+    if not isinstance(entry, LawEntry) or entry.name in taken or not NAME.fullmatch(entry.name):
         raise _refusal(
             f"{path} defines no ENTRY, or one by a name of the catalogue.",
             "Write one with `hapteq effect FOUND --out EFFECT.py`, and change that.",

@@ -64,11 +64,11 @@ class SignalStreams:
         live = read_live(self._folder)
         if live is None or live.telemetry == self._path:
             return
-        self._path = live.telemetry
         try:
-            self._reader = telemetry_of(self._path) if self._path else None
-        except StudyError:  # this sitting has ended; the next sitting has another ring
-            self._reader = None
+            self._reader = telemetry_of(live.telemetry) if live.telemetry else None
+            self._path = live.telemetry
+        except StudyError:  # this sitting has ended, or its ring cannot be opened yet: the next check tries again
+            self._reader, self._path = None, ""
         if self._reader is not None and not self._outlets:
             self._outlets = tuple(self._open_outlet(stream, self._reader.rate_hz) for stream in STREAMS)
 

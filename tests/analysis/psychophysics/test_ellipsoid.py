@@ -182,6 +182,7 @@ def test_a_sensor_that_is_turned_is_turned_back():
         ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], r"shape \(2, 3\)"),
         ({"x": 1.0}, "no matrix of numbers"),
         ([[float("nan")] * 3] * 3, "no rotation"),
+        ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]], "a reflection"),
     ],
 )
 def test_what_is_no_rotation_of_the_sensor_is_refused(recording, stated, cause):

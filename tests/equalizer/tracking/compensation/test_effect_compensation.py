@@ -103,6 +103,7 @@ def test_friction_is_cancelled_where_the_model_has_none(rubbing, plants, frictio
     assert error(device, freed, wanted) < with_it
 
 
+@pytest.mark.slow
 def test_from_recordings_freed_of_friction_a_linear_model_is_identified(rubbing, plants, wanted):
     device, known = rubbing.rubbing(plants.modes_of(), 0.1), physics(friction(0.1))
     recordings = driven_together(plants, device)
@@ -113,6 +114,7 @@ def test_from_recordings_freed_of_friction_a_linear_model_is_identified(rubbing,
     assert error(device, forces, wanted) < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [0.1, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_friction_already_in_the_model_is_not_counted_twice(rubbing, plants, wanted, level):
     device, known = rubbing.rubbing(plants.modes_of(), level), physics(friction(level))
@@ -184,14 +186,15 @@ def test_the_forces_stay_within_the_cap(frictionless, wanted):
     assert np.linalg.norm(done.forces, axis=1).max() <= cap_n
 
 
-def test_a_dead_band_is_crossed(plants, frictionless, wanted):
+@pytest.mark.parametrize("jump", [0.0, 0.5])
+def test_a_dead_band_is_crossed(plants, frictionless, wanted, jump):
     plant, width = plants.omega_like(), 0.15
-    known = physics(effect("force_deadband", width=width))
+    known = physics(effect("force_deadband", width=width, jump=jump))
     forces = inverse(frictionless, wanted)
     done = compensate(forces, wanted, frictionless, known, None)
 
     def off(commands):
-        behind = np.sign(commands) * np.maximum(np.abs(commands) - width, 0)
+        behind = np.where(np.abs(commands) > width, commands - (1 - jump) * width * np.sign(commands), 0.0)
         return rms(band_part(plant.play(behind) - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
 
     assert off(done.forces) < 0.2 * off(forces)
@@ -251,11 +254,16 @@ def test_other_frictions_have_their_shape():
 
 
 def test_a_dead_band_wider_than_the_amplitude_lets_nothing_through():
-    assert deadband_share(0.5, 0.4) == 0
-    assert deadband_share(0.0, 0.4) == 1
+    assert deadband_share({"width": 0.5}, 0.4) == 0
+    assert deadband_share({"width": 0.0}, 0.4) == 1
+
+
+@pytest.mark.parametrize("jump", [0.0, 0.4, 1.0])
+def test_a_dead_bands_describing_function_is_its_fundamental(jump):
     angle = np.linspace(0, 2 * np.pi, 10_000, endpoint=False)
-    through = np.sign(np.sin(angle)) * np.maximum(np.abs(np.sin(angle)) - 0.3, 0)
-    assert deadband_share(0.3, 1.0) == pytest.approx(2 * np.mean(through * np.sin(angle)), rel=1e-3)
+    wave = np.sin(angle)
+    through = np.where(np.abs(wave) > 0.3, wave - (1 - jump) * 0.3 * np.sign(wave), 0.0)
+    assert deadband_share({"width": 0.3, "jump": jump}, 1.0) == pytest.approx(2 * np.mean(through * wave), rel=1e-3)
 
 
 def test_only_whole_recordings_of_accelerations_can_be_freed(rubbing, plants):

@@ -53,6 +53,12 @@ def test_a_remark_in_another_encoding_does_not_matter(tmp_path):
     np.testing.assert_array_equal(found["u"], np.arange(30) % 7)
 
 
+def test_the_first_foreign_words_may_come_after_many_plain_lines(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"# plain remark\n" * 6000 + f"时间(s),载荷(N),位移(mm)\n{ROWS}\n".encode("gbk"))
+    assert list(read_arrays(path, CsvMap()).by_name) == ["时间(s)", "载荷(N)", "位移(mm)"]
+
+
 @pytest.mark.parametrize(
     ("stated", "said"), [("klingon", "There is no encoding 'klingon'"), ("ascii", "no whole ascii")]
 )

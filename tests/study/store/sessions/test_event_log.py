@@ -51,6 +51,21 @@ def test_a_torn_last_line_is_distinguished_and_mended(written, cut):
     assert [event.text for event in read_log(written).events] == ["first", "third"]
 
 
+def test_a_torn_line_that_cannot_be_removed_is_a_clear_error(written, monkeypatch):
+    written.write_bytes(written.read_bytes()[:-2])
+
+    def fail(descriptor: int, size: int) -> None:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "ftruncate", fail)
+    with pytest.raises(StudyError) as error:
+        mend(written, read_log(written))
+    assert error.value.happened == (
+        "The incomplete last line of events.jsonl in P01_001 cannot be removed: Input/output error."
+    )
+    assert error.value.saved == "All complete lines are on disk."
+
+
 def test_a_broken_line_in_the_middle_is_an_error_that_changes_nothing(written):
     first, second, _ = written.read_bytes().split(b"\n")
     damaged = first[:-5] + b"\n" + second + b"\n"

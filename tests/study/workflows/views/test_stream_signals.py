@@ -85,6 +85,20 @@ def test_without_a_ring_nothing_is_sent(tmp_path, path):
     assert look(streams) == 0 and kept.samples == {}
 
 
+def test_a_ring_that_could_not_be_opened_at_first_is_opened_later(tmp_path, rigs):
+    kept, clock = Kept(), VirtualClock()
+    streams = SignalStreams(tmp_path, kept.open)
+    with contextlib.closing(SafeDevice(rigs.ScriptedRig(), rigs.SETTINGS, clock, Ring())) as device:
+        ring = Path(device.telemetry)
+        ring.rename(ring.with_suffix(".moved"))
+        write_live(tmp_path, replace(LIVE, telemetry=device.telemetry))
+        assert look(streams) == 0 and kept.samples == {}
+        ring.with_suffix(".moved").rename(ring)
+        assert look(streams) == 0
+        ticks = played(rigs, clock, device)
+        assert look(streams) == 0 and streams.sent == ticks > 0
+
+
 def test_ticks_that_came_too_late_are_counted(tmp_path, rigs):
     clock, kept = VirtualClock(), Kept()
     with contextlib.closing(SafeDevice(rigs.ScriptedRig(), rigs.SETTINGS, clock, Ring(rows=100))) as device:
