@@ -108,6 +108,7 @@ def with_command(recording: Recording, samples: np.ndarray) -> Recording:
     return replace(recording, command=replace(recording.command, samples=samples))
 
 
+@pytest.mark.slow
 def test_the_axis_that_rubs_is_named(short):
     found = found_in(short(SEED, FRICTION, axis=2, axes=(0, 2)), without=all_but(*AMONG))
     assert [(effect.effect, effect.axis) for effect in found.effects] == [("coulomb_friction", "z")]

@@ -62,6 +62,7 @@ def test_a_late_speed_is_reported_in_milliseconds(recording, motion):
     assert "2 ms (2 samples) later" in check.seen
 
 
+@pytest.mark.slow
 def test_each_of_three_axes_finds_its_own_position(recording, moved, noise):
     forces = np.column_stack([noise(seed=k) for k in (1, 2, 3)])
     motions = [moved(forces[:, k]) for k in range(3)]

@@ -74,6 +74,7 @@ def test_training_alone_gives_no_threshold(simulate_study, protocol):
     assert (analysis.trials, analysis.thresholds) == ((), ())
 
 
+@pytest.mark.slow
 def test_detection_practice_and_catch_trials_change_no_threshold(everything, full_protocol, protocol):
     analysis = analyse_study(everything, full_protocol)
     plain = analyse_study([trial for trial in everything if trial.phase is Phase.TEST], protocol)

@@ -115,6 +115,7 @@ def test_a_second_run_at_a_frequency_is_named(able, protocol):
     assert "completed more than one run" in second
 
 
+@pytest.mark.slow
 def test_detection_practice_and_catch_trials_of_able_people_are_no_warning(everything, full_protocol, protocol):
     plain = warnings([trial for trial in everything if trial.phase is Phase.TEST], protocol)
     assert warnings(everything, full_protocol) == plain

@@ -58,6 +58,7 @@ def test_two_people_have_medians_without_an_interval_and_not_above_the_cap(proto
     assert "no interval: too few people" in page and "no lower bound" not in page
 
 
+@pytest.mark.slow
 def test_frequencies_far_above_the_cap_are_not_compared_and_the_report_says_so(protocol, simulate_study):
     guessing = float("inf")
     declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 35.0)))

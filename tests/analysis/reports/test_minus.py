@@ -63,6 +63,7 @@ def test_a_number_is_written_with_the_minus_sign_and_a_zero_without(said, expect
     assert said == expected
 
 
+@pytest.mark.slow
 def test_on_the_report_of_a_study(simulate_study, protocol):
     turned = replace(protocol, directions=replace(protocol.directions, symmetry_deg=-10.0))
     trials = simulate_study(subjects=3)

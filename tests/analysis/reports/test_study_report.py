@@ -87,6 +87,7 @@ def words(protocol):
     return render
 
 
+@pytest.mark.slow
 def test_a_full_study_is_one_page_that_needs_nothing_else(report, simulate_study):
     html = report(simulate_study(subjects=3), (ellipsoid(),))
     structure = parsed(html)
@@ -155,6 +156,7 @@ def test_a_clean_study_says_that_nothing_stands_out(words, simulate_study):
 SIDE_SECTIONS = (">Is the vibration felt at all?</h2>", ">Catch trials</h2>", ">Practice</h2>")
 
 
+@pytest.mark.slow
 def test_detection_catch_trials_and_practice_have_sections(report, everything, full_protocol):
     html = report(everything, protocol=full_protocol)
     parsed(html)
@@ -233,6 +235,7 @@ def test_the_same_study_gives_the_same_page(report, simulate_study):
     assert report(trials) == report(trials)
 
 
+@pytest.mark.slow
 def test_where_psi_chose_the_levels_nothing_speaks_of_reversals(simulate_study, protocol):
     rule = replace(protocol.staircase, bayesian=BayesianPlacement(15))
     study = replace(protocol, staircase=rule, analysis=AnalysisSettings(primary="published", contrast_hz=(45.0, 5.0)))

@@ -54,6 +54,7 @@ def test_a_worker_keeps_the_memory_that_its_fits_free_and_ask_for_again():
     assert faults < 3 * once  # a hundred times as many where each round gets its pages anew
 
 
+@pytest.mark.slow
 def test_workers_of_power_do_not_load_what_draws():
     asked = "import sys; import study.workflows.planning.simulate_power; print('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout == "False\n"

@@ -201,6 +201,7 @@ def test_the_pull_of_a_coil_is_the_first_candidate_and_laws_of_the_motion_do_not
     assert first.values["gap"] == pytest.approx(0.01 - shot.response.samples.max(), rel=0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law", [lambda i, x: 0.05 * i - 1e6 * x**3, pytest.param(lambda i, x: 0.03 * i**2, marks=pytest.mark.slow)]
 )

@@ -81,6 +81,7 @@ def _pushed(friction, width=0.0, wander=0.95, seconds=120.0, fine=20, seed=3):
     return force[:, None], position + 1e-4 * rng.standard_normal((n, 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction", "width"), [(LEVEL, 0.0), pytest.param(0.0, LEVEL, marks=pytest.mark.slow)])
 def test_a_dead_band_of_an_axis_that_rests_within_it_may_be_dry_friction(friction, width, recording_of, balance_of):
     (balance,) = balance_of(recording_of(*_pushed(friction, width), RATE_HZ))
@@ -90,6 +91,7 @@ def test_a_dead_band_of_an_axis_that_rests_within_it_may_be_dry_friction(frictio
     assert "coulomb_friction" in band.alike
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction", "wander"), [(LEVEL, 0.95), (0.0, 0.0)])
 def test_samples_in_motion_alone_show_what_holds_the_axis(friction, wander, recording_of):
     """The look that is taken where an axis mostly rests, and nothing is named over all samples."""

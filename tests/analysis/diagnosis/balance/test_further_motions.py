@@ -61,14 +61,14 @@ def test_the_band_of_the_motion_is_that_of_the_driven_one(recorded):
     assert hub_hz < 0.8 * both_hz
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_friction_of_the_hub_is_named_beside_the_beam(recorded, balance_of, seed):
     (balance,) = balance_of(recorded(FRICTION, seed))
     assert [law.law.effect for law in balance.named] in (["coulomb_friction"], ["presliding_hysteresis"])
     assert balance.named[0].values["level"] == pytest.approx(FRICTION, rel=0.2)
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_without_friction_nothing_is_named(recorded, balance_of, seed):
     assert not balance_of(recorded(0.0, seed))[0].named
 
@@ -81,6 +81,7 @@ def hub_and_beam(hub):
     )
 
 
+@pytest.mark.slow
 def test_where_no_law_is_named_the_linear_numbers_that_leave_less_of_the_forces_are_taken(recorded, balance_of):
     recording = recorded(0.0)
     balances = balance_of(recording)
@@ -105,6 +106,7 @@ def test_a_given_model_that_leaves_less_stays(recording_of, balance_of):
     assert left[1] < 0.5 * rms_of_forces(wrong)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.0, 2.0])
 def test_a_constant_force_does_not_decide_which_is_taken(recorded, balance_of, offset):
     recording = recorded(0.0)
@@ -130,6 +132,7 @@ def test_effects_of_the_actuator_are_tried_on_the_commands_as_they_are_alone(nam
     assert _unseen_by_balance(name, place, driven) is tried
 
 
+@pytest.mark.slow
 def test_with_a_named_law_or_without_balances_the_model_stays(recorded, balance_of):
     recording = recorded(FRICTION)
     given = choose_fitting_measure([recording], hub_and_beam(5 * HUB), (), "force", about_mean=True)

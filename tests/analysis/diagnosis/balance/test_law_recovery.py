@@ -137,6 +137,7 @@ def test_where_nothing_is_missing_nothing_is_named(axes, balance_of, seed):
     assert healthy(axes, balance_of, seed) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [24])
 def test_a_second_linear_mode_gets_no_nonlinear_name(axes, balance_of, seed):
     assert healthy(axes, balance_of, seed, second_mass=0.1, second_hz=12.0) == []

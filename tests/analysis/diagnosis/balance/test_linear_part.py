@@ -96,6 +96,7 @@ def test_of_two_measured_motions_the_driven_one_is_found_and_its_friction_named(
     assert balance.named[0].values["level"] == pytest.approx(LEVEL, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_body_that_is_not_measured_does_not_hide_friction(two_bodies, recording_of, balance_of):
     force, motion = two_bodies
 

@@ -45,6 +45,7 @@ def test_a_spring_that_hardens_shows_in_the_band_of_the_motion(recorded, balance
     assert law.gain_low > 0.1
 
 
+@pytest.mark.slow
 def test_a_straight_spring_has_no_name_in_either_band(recorded, balance_of):
     assert not balance_of(recorded(0.0))[0].named
 

@@ -43,6 +43,7 @@ def test_the_limit_is_named_with_its_speed(offset_m, followed, balance_of):
     assert balance.named[0].values["rate"] == pytest.approx(SPEED, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_late_command_is_in_the_first_model_beside_the_limit(followed, balance_of):
     """Else the limit would be taken for a slower one, which is late, too."""
     from analysis.diagnosis.first_model.model_from_balance import plain_model

@@ -28,6 +28,7 @@ def said(axes):
     return of
 
 
+@pytest.mark.slow
 def test_an_offset_of_the_reading_is_a_number_and_no_effect(said):
     diagnosis = said(lambda read: read + 0.02)
     assert not diagnosis.effects
@@ -49,6 +50,7 @@ def test_a_spring_that_hardens_or_softens_is_named_and_not_explained_without_rep
     assert diagnosis.effects[0].parameters["k3"].value == pytest.approx(cubic, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seconds", "names"), [(10.0, ["coulomb_friction"]), (1.4, [])], ids=["long", "too short"])
 def test_a_recording_that_is_too_short_to_name_physics_gets_candidates(axes, seconds, names):
     from analysis.diagnosis.diagnose import TOO_SHORT, diagnose
@@ -63,6 +65,7 @@ def test_a_recording_that_is_too_short_to_name_physics_gets_candidates(axes, sec
         assert (found.candidates[0].effect, found.candidates[0].why_not) == ("coulomb_friction", TOO_SHORT)
 
 
+@pytest.mark.slow
 def test_a_short_recording_gets_no_name_by_the_search_either(axes):
     """Its readings are clipped, which a search by simulation would name."""
     from analysis.diagnosis.diagnose import diagnose

@@ -64,6 +64,7 @@ def imposed_motion(seed: int) -> Recording:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_friction_that_falls_with_the_temperature_is_named_and_played():
     celsius = warming(1)
     found = diagnose_values(rubbing_mass(2.5 - 0.04 * (celsius - 20), celsius + 273.15, 5)).diagnosis
@@ -77,12 +78,14 @@ def test_friction_that_falls_with_the_temperature_is_named_and_played():
     assert found.fit.test.after < 0.1 * found.fit.test.before
 
 
+@pytest.mark.slow
 def test_friction_that_a_setting_changes_is_named_where_the_motion_is_imposed():
     found = diagnose_values(imposed_motion(5)).diagnosis
     assert found.effects[0].class_[:2] == ("discovered_law", "condition_dependent_friction")
     assert found.fit.test.after < 0.15 * found.fit.test.before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_condition_that_does_nothing_is_not_named(seed):
     found = diagnose_values(rubbing_mass(np.full(SAMPLES, 2.0), warming(seed), seed)).diagnosis

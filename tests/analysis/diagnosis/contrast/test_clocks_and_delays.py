@@ -32,6 +32,7 @@ BEGIN = 3000
 """First sample with a reading."""
 
 
+@pytest.mark.slow
 def test_a_clock_that_ran_on_before_the_first_reading_is_named_with_its_rate(rig):
     late = rig.read_as(2, lambda y: resample(y, np.arange(len(y)) * (1 + 2e-3)))
     read = late.response.samples.copy()
@@ -182,6 +183,7 @@ def test_interpolation_makes_prediction_errors_of_noise_smaller_by_what_is_said(
     assert smaller == pytest.approx(noise_kept(by), rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_noise_of_a_reading_is_neither_late_nor_bent(seed):
     """The mean of two readings has less noise than either, and so has a reading on the flat part of a curve: late
@@ -210,6 +212,7 @@ def delayed(recording: Recording, command_rows: int, response_rows: int) -> Reco
     )
 
 
+@pytest.mark.slow
 def test_a_late_reading_that_hides_an_error_of_the_clean_set_explains_the_difference(rig):
     """The drive of this device is late as well: late readings make the faulty set's errors smaller than the clean
     one's, and undoing them makes them larger. That counted against it: it explained 42 %."""
@@ -221,6 +224,7 @@ def test_a_late_reading_that_hides_an_error_of_the_clean_set_explains_the_differ
     assert late.share > 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late", [37, 393])
 def test_a_long_delay_is_named_with_an_interval_that_holds_it(late):
     """Half of a delay of many oscillations, undone, was taken for a delay of half its length."""

@@ -10,6 +10,7 @@ from analysis.diagnosis.contrast.decide import decide
 from equalizer.signals.recording import Recording
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_another_recording_of_the_same_device_names_nothing(rig, seed):
     found = rig.contrast(seed=seed).decision
@@ -34,6 +35,7 @@ def test_an_effect_that_is_not_to_be_considered_is_not_named(rig):
     assert found.named is None or found.named.fault.effect != "added_mass"
 
 
+@pytest.mark.slow
 def test_a_body_alone_cannot_tell_a_mass_from_a_gain(rig):
     """The force is proportional to the acceleration: more mass, less force, and a sensor that reads less are one."""
     random = np.random.default_rng(5)

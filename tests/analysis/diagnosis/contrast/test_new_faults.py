@@ -17,9 +17,9 @@ from equalizer.signals.signal import FloatArray
 @pytest.mark.parametrize(
     ("change", "level", "number", "place"),
     [
-        ("added_mass", 0.3, "mass", "mechanism"),
+        pytest.param("added_mass", 0.3, "mass", "mechanism", marks=pytest.mark.slow),
         pytest.param("viscous_damping", 2.0, "damping", "mechanism", marks=pytest.mark.slow),
-        ("coulomb_friction", 0.6, "level", "mechanism"),
+        pytest.param("coulomb_friction", 0.6, "level", "mechanism", marks=pytest.mark.slow),
         ("force_gain", 0.75, "gain", "actuator"),
         pytest.param("sensor_gain", 1.3, "gain", "sensor", marks=pytest.mark.slow),
     ],
@@ -62,17 +62,20 @@ def behind(gap: float):
     return made
 
 
+@pytest.mark.slow
 def test_play_before_a_sensor_is_named_with_its_gap(rig):
     found = rig.decision(rig.read_as(2, behind(0.008)))
     assert found.named is not None and found.named.fault.effect == "sensor_play"
     assert found.named.values["gap"] == pytest.approx(0.008, rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_drift_that_began_before_the_recording_is_no_offset(rig):
     found = rig.decision(rig.read_as(2, lambda y: y + 0.04 * np.linspace(0.4, 1.0, len(y))))
     assert found.named is not None and found.named.fault.effect == "sensor_drift"
 
 
+@pytest.mark.slow
 def test_an_offset_is_no_drift(rig):
     found = rig.decision(rig.read_as(2, lambda y: y + 0.05))
     assert found.named is not None
@@ -100,6 +103,7 @@ def test_a_drive_that_follows_slowly_is_named(rig):
     assert min(left) < 0.3 * np.std(asked - given)
 
 
+@pytest.mark.slow
 def test_a_fault_that_upsets_the_balance_of_forces_is_undone_in_it(rig):
     """With it, 43 % of that recording's forces are left over: more than a balance may leave that is to be used."""
     plain = rig.recording(2)
@@ -112,6 +116,7 @@ def test_a_fault_that_upsets_the_balance_of_forces_is_undone_in_it(rig):
     assert found.faults[0].values["width"] == pytest.approx(8.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_mass_of_a_device_of_a_few_nanograms_is_named_too(rig):
     """1 in SI units is far beyond such a device: products of size 1 are of no magnitude that tells anything."""
 

@@ -32,6 +32,7 @@ def two_drives(seed: int, gain: float = 1.0) -> Recording:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gain", [0.6, pytest.param(1.4, marks=pytest.mark.slow)])
 def test_the_gain_of_one_of_two_drives_of_one_body_is_told_the_right_way_round(rig, gain):
     faulty = two_drives(3, gain)

@@ -12,6 +12,7 @@ from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, add_contra
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 
 
+@pytest.mark.slow
 def test_a_fault_that_the_comparison_cannot_undo_is_left_open(rig):
     found = rig.contrast("coulomb_friction", 0.6, rig.UNDONE)
     assert found.left_open

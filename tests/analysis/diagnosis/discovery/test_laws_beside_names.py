@@ -81,6 +81,7 @@ def test_an_exponent_that_was_rounded_counts_as_a_number(hardened):
     assert not does_as_well_with_less(context, found, two.after)
 
 
+@pytest.mark.slow
 def test_the_shorter_law_takes_the_place_of_names_that_fit(hardened):
     context, _ = hardened
     cube, stop = claim("hardening_stiffness", k3=CUBIC), claim("end_stop", position=1.0, stiffness=1e3, opposite=1.0)
@@ -102,6 +103,7 @@ def test_a_name_that_is_as_short_stays(hardened):
     assert not does_as_well_with_less(context, found, cube.after)
 
 
+@pytest.mark.slow
 def test_a_law_whose_rivals_were_not_fitted_is_a_candidate(hardened):
     context, _ = hardened
     names = named(hardened, claim("quadratic_damping", coefficient=0.1))

@@ -43,6 +43,7 @@ def names_of(result):
     return {claim.effect.name for claim in result.found.after.fitted.hypothesis.claims}
 
 
+@pytest.mark.slow
 def test_a_law_that_explains_ends_the_search_before_a_second_effect(seed=11):
     result, said = searched(recorded((DRAG_15,), seed))
     assert result.judgement.verdict == "explained"
@@ -53,6 +54,7 @@ def test_a_law_that_explains_ends_the_search_before_a_second_effect(seed=11):
     assert "looking for the second effect" in searched(recorded((DRAG_15,), seed), with_laws=False)[1]
 
 
+@pytest.mark.slow
 def test_two_effects_keep_their_names(seed=12):
     """Laws are asked for before the second; a sum of both terms would be no shorter."""
     result, said = searched(recorded((CUBE, DRAG_2), seed))
@@ -61,7 +63,7 @@ def test_two_effects_keep_their_names(seed=12):
     assert "looking for a law that has no name" in said
 
 
-@pytest.mark.parametrize("seed", [13, 20])
+@pytest.mark.parametrize("seed", [pytest.param(13, marks=pytest.mark.slow), 20])
 def test_an_effect_that_fits_keeps_its_name(seed):
     """Of seed 13 the held-out samples leave enough to look for a law: it is the same formula, and no better."""
     result, said = searched(recorded((CUBE,), seed))
@@ -70,6 +72,7 @@ def test_an_effect_that_fits_keeps_its_name(seed):
     assert ("looking for a law that has no name" in said) == (seed == 13)
 
 
+@pytest.mark.slow
 def test_the_same_samples_are_searched_for_laws_once(seed=14):
     said: list[str] = []
     context, known = arena_of(recorded((DRAG_15,), seed))
@@ -79,7 +82,7 @@ def test_the_same_samples_are_searched_for_laws_once(seed=14):
     assert laws_of(once.found.after.fitted.hypothesis) == laws_of(again.found.after.fitted.hypothesis)
 
 
-@pytest.mark.parametrize("hears", [True, False])
+@pytest.mark.parametrize("hears", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_out_of_time_over_a_pair_the_law_that_leaves_a_part_is_kept(hears, seed=15):
     """hears: whether a law was found before the time ended."""
     context, _ = arena_of(recorded((DRAG_15,), seed))

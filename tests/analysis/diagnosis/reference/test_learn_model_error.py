@@ -57,6 +57,7 @@ def test_what_an_intact_device_differs_by_is_named_only_without_clean_recordings
     )
 
 
+@pytest.mark.slow
 def test_what_is_larger_is_named_still_and_by_itself(diagnosed, clean, found_in):
     found = found_in(diagnosed.recorded(1, (LAG, RUBBING), seed=5), clean)
     assert (named(found), found.diagnosis.verdict) == (["coulomb_friction"], "explained")
@@ -66,6 +67,7 @@ def test_what_is_larger_is_named_still_and_by_itself(diagnosed, clean, found_in)
     assert not any(cell.significant for cell in found.maps["after"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [6, pytest.param(7, marks=pytest.mark.slow)])
 def test_a_hum_below_the_learned_model_error_is_named(diagnosed, clean, seed):
     """At a frequency where it differs by little; the same without a hum is no mismatch."""

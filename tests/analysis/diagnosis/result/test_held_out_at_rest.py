@@ -60,6 +60,7 @@ def test_where_nothing_moves_at_all_nothing_stands_still():
     assert not held_out_stands_still(observe_parts([turning(noise)], 1), NOISE)
 
 
+@pytest.mark.slow
 def test_a_stretch_at_rest_that_is_marked_as_test_stays_and_gives_no_error():
     moving = recorded(1)
     still = len(moving) - 3000, len(moving)

@@ -110,6 +110,7 @@ def rubbing_and_late(arena_of):
     return arena_of((rubs, PlacedEffect(EFFECTS["sensor_lag"], (0,), {"bandwidth": LAG_HZ})), axes=2)
 
 
+@pytest.mark.slow
 def test_a_plain_law_is_exchanged_for_its_refinement_beside_the_second(rubbing_and_late, monkeypatch):
     import analysis.diagnosis.search.revise_selection as revised
 
@@ -243,6 +244,7 @@ def test_a_small_second_effect_goes_unless_held_out_samples_confirm_it(limited_a
     assert drop_unconfirmed(limited_and_late, large) is large
 
 
+@pytest.mark.slow
 def test_no_fourth_effect_is_looked_for_beside_three_that_are_taken_over(limited_and_late):
     found = found_of(
         limited_and_late,

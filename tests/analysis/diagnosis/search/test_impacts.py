@@ -104,6 +104,7 @@ def test_a_gap_whose_interval_contains_zero_is_open(loose, told):
     assert all(open_effects(loose[0], replace(told, statistic=wide)))
 
 
+@pytest.mark.slow
 def test_play_whose_gap_is_open_is_not_named(loose, monkeypatch):
     monkeypatch.setattr("analysis.diagnosis.search.identifiability.INTERVAL_FACTOR", 1e6)
     assert explain_impacts(*loose, CATALOGUE) is None
@@ -142,6 +143,7 @@ def test_a_friction_that_the_search_tried_is_named_beside_play(diagnosed):
     assert judge(rubbed).verdict == "explained"
 
 
+@pytest.mark.slow
 def test_without_time_no_second_effect_is_looked_for(diagnosed):
     hum = PlacedEffect(EFFECTS["mains_hum"], (0, 1), {"amplitude": 2.0, "frequency": 60.0, "phase": 1.0})
     late = explain_impacts(*searched(diagnosed, (*LOOSE, hum)), CATALOGUE, lambda: False)
@@ -162,6 +164,7 @@ def asks_gap(real, gap_m, supposed_m):
     return _needs_gap(comparison_of(context, fitted), view, fitted)
 
 
+@pytest.mark.slow
 def test_two_bodies_that_touch_need_no_gap_and_play_does(diagnosed):
     assert not asks_gap(diagnosed, 1e-9, 1e-7)
     assert asks_gap(diagnosed, GAP_M, GAP_M)

@@ -55,6 +55,7 @@ def test_what_was_moved_is_said(far):
     assert far.tuning.bound == WIDER_RETUNING_BOUND
 
 
+@pytest.mark.slow
 def test_beyond_the_wider_bound_nothing_is_explained():
     found = diagnosed_with(off_by(1.2 * WIDER_RETUNING_BOUND))
     assert found.diagnosis.verdict != "explained"

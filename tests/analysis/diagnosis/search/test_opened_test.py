@@ -114,6 +114,7 @@ STOP_AND_SENSOR = draw(102000, 86)
 COARSE_ALONE = pytest.param(FINER_PARTS[:1], set(), marks=pytest.mark.slow)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("finer", "named"), [COARSE_ALONE, (FINER_PARTS, set(STOP_AND_SENSOR.effects))])
 def test_few_contacts_with_a_stop_are_found_in_fine_parts_alone(finer, named, monkeypatch):
     monkeypatch.setattr(search_context, "FINER_PARTS", finer)

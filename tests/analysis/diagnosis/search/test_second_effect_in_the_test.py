@@ -28,6 +28,7 @@ def names(case, time_left=always):
     return found.diagnosis.verdict, {effect.effect for effect in found.diagnosis.effects}, found.remarks
 
 
+@pytest.mark.slow
 def test_it_is_found_in_a_part_of_the_test_and_confirmed_by_the_rest(case):
     assert {truth.effect for truth in case.truth} == {"sensor_lag", "hardening_stiffness"}
     verdict, named, remarks = names(case)

@@ -58,6 +58,7 @@ def prepared():
     return answers, objective, Quadrature(answers, Family.WEIBULL), objective.begin
 
 
+@pytest.mark.slow
 def test_an_integral_is_the_sum_over_a_grid(prepared):
     """Where Laplace's method is off by up to a tenth."""
     answers, objective, quadrature, numbers = prepared

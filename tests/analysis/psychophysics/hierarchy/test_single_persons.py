@@ -20,6 +20,7 @@ from tests.analysis.conftest import PUBLISHED
 HZ = (5.0, 15.0, 25.0)
 
 
+@pytest.mark.slow
 def test_thresholds_are_recovered_and_intervals_hold_them():
     errors, held = [], []
     for number in range(25):

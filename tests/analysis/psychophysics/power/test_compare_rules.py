@@ -73,6 +73,7 @@ def test_sessions_analyse_such_runs(simulate):
     assert guesser.censored and guesser.threshold_n <= 3.0
 
 
+@pytest.mark.slow
 def test_the_command_prints_each_rule_and_simulates_whole_studies_by_psi(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     told = CliRunner().invoke(app, ["power", "--compare", "--studies", "10", "--json"])

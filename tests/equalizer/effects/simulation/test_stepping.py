@@ -145,7 +145,8 @@ LOOSE = ("loose_joint", (0,), {"gap": 1e-4, "stiffness": 2e3, "slip": 0.05})
     ],
 )  # fmt: skip
 def test_three_axes_move_as_the_plain_recipe_says(bench, named, steps, fine):
-    commands = 2 * bench.commands(3)[300 : 300 + SAMPLES] + 0.2
+    samples = SAMPLES if len(named) < 2 else SAMPLES // 8  # the recipe solves several forces by iteration, in Python
+    commands = 2 * bench.commands(3)[300 : 300 + samples] + 0.2
     assert_same(bench.three_axes(), placed(*named), commands, steps, fine)
 
 
@@ -197,7 +198,7 @@ def _heavier(of: np.ndarray, memory: np.ndarray, at: np.ndarray) -> float:
 def test_a_law_knows_the_acceleration_if_its_effect_asks_for_it(bench, asked):
     acts = AxisForce(_heavier, lambda model, axis, values: np.array([0.05]), acceleration=asked)
     effects = [PlacedEffect(replace(EFFECTS["coulomb_friction"], acts=acts), (axis,), {}) for axis in (0, 1)]
-    commands = bench.commands(3)[:SAMPLES] + 0.1
+    commands = bench.commands(3)[: SAMPLES // 3] + 0.1
     if asked:
         assert_same(bench.three_axes(), effects, commands, 4)
     else:

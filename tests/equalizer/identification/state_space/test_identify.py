@@ -91,6 +91,7 @@ def test_too_low_an_order_fits_worse_and_reports_it(measuring, centre, response)
     assert any("order 8 may be too low" in remark for remark in low.remarks)
 
 
+@pytest.mark.slow
 def test_two_estimates_together_are_better_than_each(plants, measuring, centre, response):
     other = measuring.swept(plants, centre, 2, low_hz=1.0, high_hz=500.0, seconds=20.0)
     settings = replace(QUICK, order=20)

@@ -11,7 +11,7 @@ from study.evaluation.bank.proof_folder import RECORDING, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan, seal_cases
 
-PLAN = BankPlan(51_404, 1, brief=True)
+PLAN = BankPlan(51_401, 1, brief=True)
 KILLED = """
 import os, signal, sys
 from pathlib import Path
@@ -25,7 +25,7 @@ def die(path, text):
     if path.name != sealing.SETTINGS:
         os.kill(os.getpid(), signal.SIGKILL)
 sealing.write_text = die
-(drawn,) = sealing.drawable_cases(sealing.BankPlan(51_404, 1, brief=True))
+(drawn,) = sealing.drawable_cases(sealing.BankPlan(51_401, 1, brief=True))
 sealing.seal_one(ProofFolder(Path(sys.argv[1])), drawn)
 """
 """Before or after the label is written."""

@@ -72,6 +72,7 @@ def test_a_calibrated_model_is_off_by_its_tolerances_at_the_driven_axes_alone():
     assert np.std(offsets) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_retuning_finds_the_bench_when_nothing_hides():
     random = np.random.default_rng(4)
     bench, plan = draw_bench(random), first_seconds(draw_plan(random))

@@ -46,6 +46,7 @@ def misfit(device, recording):
     return max(apart[read[:, j], j].std() for j in range(3))
 
 
+@pytest.mark.slow
 def test_where_nothing_is_missing_only_noise_is_left(opened):
     recording, model, _ = opened("open-00")
     plan = DrivePlan(recording.command.samples, recording.segments)
@@ -53,6 +54,7 @@ def test_where_nothing_is_missing_only_noise_is_left(opened):
     assert misfit(Device(bench), recording) < 1.03
 
 
+@pytest.mark.slow
 def test_the_labelled_saturation_explains_its_case(opened):
     recording, model, (truth,) = opened("open-07")
     (effect,) = (each for each in ACTUATOR if each.name == truth["effect"])

@@ -106,6 +106,7 @@ def test_parts_by_chance_are_whole_and_in_one_half_only():
     pytest.fail("no seed made halves of parts")
 
 
+@pytest.mark.slow
 def test_what_a_fault_changes_is_what_a_base_of_the_clean_half_misses(split):
     sound, rest = (without_lead(half) for half in split)
     assert held_out_change(sound, rest, rest) == 1.0

@@ -37,6 +37,7 @@ def silent(what: str, share: float) -> None:
     return None
 
 
+@pytest.mark.slow
 def test_one_recording_is_answered_and_the_others_are_reported(folder: Path, tmp_path: Path) -> None:
     done = diagnose_folder(RealPlan(folder, tmp_path / "out"), silent)
     axis, torn = done.results.answers
@@ -102,6 +103,7 @@ tests = "TESTS"
 """
 
 
+@pytest.mark.slow
 def test_which_way_a_command_is_counted_is_decided_once_for_the_tests_too(tmp_path: Path) -> None:
     """The test moves so slowly that a spring is all that it shows, which tells no sign."""
     whole, time_s = tmp_path / "recordings" / "spring", np.arange(int(RATE_HZ * SECONDS)) / RATE_HZ
@@ -167,6 +169,7 @@ def test_an_unknown_model_is_refused_with_the_names_of_known_ones(tmp_path: Path
     assert all(model_for(name, tmp_path).is_file() for name in list_shipped_models())
 
 
+@pytest.mark.slow
 def test_faults_are_injected_under_a_seal_and_counted(folder: Path, tmp_path: Path) -> None:
     # What the answers are is not asked here.
     plan = RealPlan(folder, tmp_path / "out", inject=1, seed=6, seconds=1.0)

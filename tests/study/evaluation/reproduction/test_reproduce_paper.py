@@ -73,6 +73,7 @@ def test_all_five_figures_come_out_beside_what_is_published(written, plan):
     assert {"equalized-response.png", "transfer-functions.svg", "ellipsoids.png", "frequency-bands.svg"} <= drawn
 
 
+@pytest.mark.slow
 def test_the_quality_of_the_models_comes_before_what_they_play(written, plan):
     models = {model.name: model for model in written.reproduction.models}
     assert set(models) == {"centre", "between 1", "between 2", "frictionless", "hand"}
@@ -83,11 +84,13 @@ def test_the_quality_of_the_models_comes_before_what_they_play(written, plan):
     assert f"<td>{100 * stored.expected_error:.2f} %</td>" in page
 
 
+@pytest.mark.slow
 def test_the_document_is_read_again_and_recognised(written):
     assert read_reproduction(written.document) == written.reproduction
     assert validate_file(written.document).problems == ()
 
 
+@pytest.mark.slow
 def test_a_document_with_a_wrong_number_says_where(written, tmp_path):
     document = json.loads(written.document.read_text())
     document["order"] = "eight"
@@ -99,6 +102,7 @@ def test_a_document_with_a_wrong_number_says_where(written, tmp_path):
         reproduction_from_json({"order": 8})
 
 
+@pytest.mark.slow
 def test_the_equalizer_is_better_at_the_centre_than_nothing(written):
     rows = {(row.name, row.device, row.signal): row for row in written.reproduction.played}
     device = written.reproduction.device
@@ -108,12 +112,14 @@ def test_the_equalizer_is_better_at_the_centre_than_nothing(written):
     assert equalized.flatness_db < plain.flatness_db
 
 
+@pytest.mark.slow
 def test_friction_is_named_and_its_twin_stands_beside_it(written):
     devices = {row.device for row in written.reproduction.played}
     assert devices == {"simulated omega.3", "simulated omega.3 without friction"}
     assert "What friction costs" in written.report.read_text()
 
 
+@pytest.mark.slow
 def test_the_next_run_takes_what_is_there(written, plan):
     files = [folder / "centre.h5" for folder in (plan.recordings, plan.models)]
     kept = [path.stat().st_mtime_ns for path in files]
@@ -122,6 +128,7 @@ def test_the_next_run_takes_what_is_there(written, plan):
     assert [path.stat().st_mtime_ns for path in files] == kept
 
 
+@pytest.mark.slow
 def test_a_part_of_a_recording_is_made_again(written, plan):
     path = plan.recordings / "ellipsoid.h5"
     whole = read_recording(path)
@@ -131,6 +138,7 @@ def test_a_part_of_a_recording_is_made_again(written, plan):
     assert not found.recording.meta["interrupted"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wanted", "why"),
     [
@@ -152,6 +160,7 @@ def test_a_recording_that_cannot_be_read_is_left_alone(plan, tmp_path):
     assert (other.recordings / "centre.h5").read_text() == "no recording"
 
 
+@pytest.mark.slow
 def test_another_seed_in_the_same_folder_is_refused(written, plan):
     other = ReproductionPlan(plan.out, 2, 4, 2, plan.protocols, order=8, period_s=2.0)
     with pytest.raises(StudyError, match="holds another reproduction.*made with another seed"):

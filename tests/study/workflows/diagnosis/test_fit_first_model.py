@@ -127,6 +127,7 @@ def test_a_pendulum_is_a_spring_about_its_mean_and_that_is_said(tmp_path):
     assert any("linearised" in remark for remark in done.remarks)
 
 
+@pytest.mark.slow
 def test_a_body_on_a_body_is_two_mode(tmp_path):
     eye = np.array([[1.0, 0.0]])
     given = MechanicalModel(

@@ -73,6 +73,7 @@ def test_no_place_is_reported_in_hertz(first):
     assert "Hz" in place_of(row)
 
 
+@pytest.mark.slow
 def test_a_speed_without_a_clock_is_diagnosed_with_samples_as_its_time():
     """A motor with dry friction, in random steps of its command."""
     random = np.random.default_rng(3)

@@ -128,6 +128,7 @@ def test_a_band_without_lines_is_refused_and_nothing_is_written(protocol, tmp_pa
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_model_and_says_what_it_is(tmp_path, capsys):
     protocol, out = tmp_path / "shorter.toml", tmp_path / "m.toml"
     segments = (SEGMENT.format(along=a, to_hz=26.0, duration_s=2.0, seed=i) for i, a in enumerate("xyz"))

@@ -93,6 +93,7 @@ def test_the_file_keeps_how_good_the_model_is(device):
     assert summary(device)["quality"]["expected_error"] == quality.expected_error
 
 
+@pytest.mark.slow
 def test_the_page_shows_transfer_functions_bands_and_the_choice_of_order(device, tmp_path):
     page = report_identification(device, tmp_path / "page", lambda share: None)
     text = page.read_text()
@@ -123,6 +124,7 @@ def test_one_axis_is_too_little(plants, tmp_path):
     assert "No model can be made" in refused(IdentifyPlan((tmp_path / "x.h5",), tmp_path / "m.h5")).title
 
 
+@pytest.mark.slow
 def test_recordings_of_two_places_are_no_model_of_one(folder, plants, tmp_path):
     other = replace(swept(plants), meta={"place_m": [0.05, 0.0, 0.0]})
     write_recording(tmp_path / "edge.h5", other)

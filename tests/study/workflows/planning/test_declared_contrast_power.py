@@ -55,6 +55,7 @@ def test_a_folder_goes_on_with_its_own_pair_alone(tmp_path):
         run(replace(plan, contrast_hz=(5.0, 45.0)))
 
 
+@pytest.mark.slow
 def test_the_command_takes_the_contrast_of_the_protocol(tmp_path, capsys):
     text = PUBLISHED.replace("contrast_hz = []", "contrast_hz = [15.0, 25.0]")
     assert text != PUBLISHED

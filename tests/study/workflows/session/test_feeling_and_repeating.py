@@ -63,6 +63,7 @@ def test_who_asks_for_nothing_is_not_flagged(sitter, observer):
     assert repeat_warning(conducted(sitter, observer).state.trials) == ""
 
 
+@pytest.mark.slow
 def test_a_rehearsal_is_of_the_chosen_people_and_goes_on_with_no_others(sitter):
     def rehearsal(observer):
         return Rehearsal(sitter.protocol, sitter.text, 1, 5, sitter.data, observer=observer)

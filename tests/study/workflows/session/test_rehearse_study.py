@@ -88,6 +88,7 @@ def test_a_rehearsal_says_whether_its_protocol_was_locked(sitter, locked):
     assert collect_sessions(sitter.data).locked.startswith("yes" if locked else "no")
 
 
+@pytest.mark.slow
 def test_a_rehearsal_does_not_continue_with_another_model(tmp_path, equalized):
     equalized = replace(equalized, subjects=1)
     rehearse_study(equalized, workers=1, on_finished=lambda done: None)

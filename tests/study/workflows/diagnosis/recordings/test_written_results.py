@@ -59,6 +59,7 @@ def test_the_engine_gets_recordings_model_names_and_a_parallel_map(files, findin
     assert engine.model.inputs == len(engine.recordings[0].command.channels) == 1
 
 
+@pytest.mark.slow
 def test_without_a_model_a_linear_one_is_fitted_first_and_reported(files, findings, tmp_path):
     engine, shares = Scripted(findings), []
     alone = plan(files, tmp_path / "out", model=None)

@@ -38,6 +38,7 @@ def test_it_compiles_without_a_warning_and_agrees_with_python(vendor, tmp_path, 
     assert re.search(r"a tick: transient \d+ ns, stream \d+ ns", done.stdout)
 
 
+@pytest.mark.slow
 def test_the_longest_preview_that_is_accepted_is_compared_too(vendor, tmp_path):
     """The first sample of a stream is played after it."""
     settings = RealtimeSettings(preview_s=LONGEST_PREVIEW_S)

@@ -220,6 +220,7 @@ def test_a_position_beyond_all_numbers_is_no_force(chai3d):
     assert not chai3d(-1e300).any()
 
 
+@pytest.mark.slow
 def test_in_chai3d_missed_ticks_are_not_sent_and_a_stall_ends_in_zero(chai3d):
     undisturbed, missed, stalled = chai3d(-0.001), chai3d(-0.001, stall_ms=15.5), chai3d(-0.001, stall_ms=21.5)
     np.testing.assert_array_equal(missed[:AFTER], undisturbed[:AFTER])
